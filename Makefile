@@ -13,7 +13,7 @@
 #                 FOLDER holds recordings; ARGS="order ablate" plays these two, ARGS=--list prints order and costs
 # make test-speed   hold the ratios of speed to the published ones; nothing else may run meanwhile
 # make docs       build the documentation's site into build/site
-# make check      format, lint, types, tests
+# make check      format, lint, types, plain words, tests
 # make torture    random input for ten minutes: commands, calls, files, kills, full disks; SECONDS=600 SEED=0
 #                 CAMPAIGNS="commands files" CASES=1000 unless all; CASE=NAME plays one case alone
 # make official RESULTS=FILE DATA=FOLDER   score a file of `care-sim export` with the nuScenes devkit, which has an
@@ -141,6 +141,7 @@ lint: $(VENV)/.developing
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+	$(BIN)/python -m pytest --quiet tests/repository/test_words.py
 
 check: $(VENV)/.developing
 	$(BIN)/ruff format .

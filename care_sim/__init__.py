@@ -100,7 +100,7 @@ def __getattr__(name: str) -> object:
     if name == "__version__":
         from importlib.metadata import version
 
-        # Kept: it is read from a file, and every task of a study asks for it.
+        # Cached: the version is read from a file, and every task of a study needs it.
         globals()[name] = version("care-sim")
         return globals()[name]
     if name in _PLACES:

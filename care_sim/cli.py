@@ -50,15 +50,15 @@ _KEPT = {
     **dict.fromkeys(("benchmark", *GROUPS["Studies"]), _FINISHED_STAYS),
     **dict.fromkeys(("train ppo", "train sac", "train recurrent-ppo"), _LEARNED_STAYS),
 }
-"""What is added to "interrupted" for commands that keep what they have finished."""
+"""Appended to "interrupted" for commands that keep finished work."""
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and exit.
 
-    Exit codes: 0 done, 1 something failed, such as code of the user's own or a limit of the
-    machine, or a policy was left out, 2 bad input, 70 a fault of the software itself, 130
-    interrupted, 141 nobody reads the output any more. `--debug` shows the trace of a fault.
+    Exit codes: 0 done, 1 a failure or a policy left out, 2 bad input, 70 a fault of the software,
+    130 interrupted, 141 nobody reads the output. A failure is an error of the user's own code, or a
+    limit of the machine. `--debug` shows the trace of a fault.
     """
     # A host that calls this with arguments keeps its handlers of signals and its process.
     alone = arguments is None
@@ -66,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     arguments = [argument for argument in given if argument != _DEBUG]
     try:
         if alone:
-            interrupts.raise_them()
+            interrupts.raise_interrupts()
             # Modules, compiled code and rows live to the end: a collector that walks them all every
             # few thousand new objects takes a seventh of the time of a report.
             gc.set_threshold(_NEW_OBJECTS)
@@ -155,7 +155,7 @@ def _finished(arguments: list[str]) -> int:
     _check_texts(arguments)
     try:
         first = arguments[0] if arguments else "--help"
-        if (text := _told(first, arguments[1:])) is not None:
+        if (text := _static_text(first, arguments[1:])) is not None:
             print(text)
             return 0
         command, options = parsed_command(arguments)
@@ -194,7 +194,7 @@ def parsed_command(arguments: Sequence[str]) -> tuple[Command, Any]:
     return command, read_options(command.options_class(), f"care-sim {name}", rest)
 
 
-def _told(first: str, rest: Sequence[str]) -> str | None:
+def _static_text(first: str, rest: Sequence[str]) -> str | None:
     """Return the text that is printed where no command runs; None where one does."""
     if first in ("-h", "--help"):
         return _overview()

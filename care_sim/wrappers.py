@@ -1,7 +1,6 @@
-"""The wrappers. Some make an environment easier to learn in: `SectorReserve`, `SectorScores` and
-`GridObservation`, each with tables of its action and observation, and the same over vector
-environments, whose names begin with `Vector`. The others watch an episode and leave it as it is:
-`RecordRerun` and `ExportScans`.
+"""The wrappers. Three make learning easier: `SectorReserve`, `SectorScores` and `GridObservation`,
+each with tables of its action and observation. Their versions for vector environments have names
+with `Vector`. The others watch an episode and leave it as it is: `RecordRerun` and `ExportScans`.
 """
 
 from care_sim.envs.wrappers.export_scans import ExportScans

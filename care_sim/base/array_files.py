@@ -21,9 +21,10 @@ from care_sim.base.files import ZIP, replacing
 MOST_UNPACKED_BYTES = 2**26
 """Bytes that a file may hold when it is unpacked; the shipped ones hold some millions at most."""
 LARGEST_WEIGHT = 1e6
-"""What a weight may be, of either sign; the shipped ones stay below 100. A file holds 2^24
-numbers, so that three layers of any shape, whose inputs are at most 1, stay below 1e29, while
-float32 ends at 3e38. Whoever has more layers looks at what they answer."""
+"""Largest magnitude of a weight; shipped weights stay below 100. A file holds at most 2^24 numbers.
+Three layers of any shape with inputs up to 1 then stay below 1e29, and float32 ends at 3e38. With
+more layers, check the outputs.
+"""
 _CARD = "card"
 
 Arrays = dict[str, NDArray[np.float32]]

@@ -1,9 +1,9 @@
-"""Checks of values from outside: each raises one line that names the value and what is allowed.
+"""Checks of values from outside. Each raises one line that names the value and what is allowed.
 
-The limits of a field of a dataclass stand beside its default, are checked when the dataclass is
-made, and are told by lists. The kind follows from the default: a flag, text, a whole number, a
-number, or, where it is bounded, a range of numbers (low, high). A field whose default is None may
-stay None. Numbers of any type become Python's own, so that equal configurations are written alike.
+Limits of a dataclass field stand beside its default, are checked when the dataclass is made, and
+are printed by lists. The kind follows from the default: a flag, text, a whole number, a number, or,
+where it is bounded, a range of numbers (low, high). A field whose default is None may stay None.
+Numbers of any type become Python's own, so that equal configurations are written alike.
 """
 
 import math
@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from care_sim.base.errors import InvalidInput, shown, unknown
 
 LARGEST_INTEGER = 2**31 - 1
-"""What a whole number may be where nothing else is said."""
+"""Default bounds of whole numbers."""
 LARGEST_SEED = 2**63 - 1
-"""What a column of a results file holds."""
+"""Bounds of a column in a results file."""
 LONGEST_PATH = 4095
 LONGEST_NAME = 255
 """Bytes of a path and of a name in it (Linux)."""
@@ -35,7 +35,7 @@ def check_known(kind: str, name: object, known: Iterable[str]) -> None:
 
 
 def check_arguments(of: str, given: Iterable[str], known: Iterable[str]) -> None:
-    """Raise InvalidInput for a name that is no argument of something; it tells the nearest."""
+    """Raise InvalidInput for an unknown argument name; the error suggests the nearest one."""
     known = [*known]
     for name in given:
         if name not in known:
@@ -122,7 +122,7 @@ def check_seed(seed: object, name: str = "seed") -> None:
 
 
 def check_path(name: str, value: object) -> None:
-    """Raise InvalidInput for what no file or folder can be called."""
+    """Raise InvalidInput for an impossible name of a file or folder."""
     # As bytes, for a file system counts those. A path in bytes is refused: tables hold text.
     try:
         path = b"" if isinstance(value, bytes) else os.fsencode(value)  # type: ignore[arg-type]
@@ -182,7 +182,7 @@ def allowed(one: Field[Any]) -> str:
     if _BOUNDS not in one.metadata:
         return ""
     least, most = one.metadata[_BOUNDS]
-    # A limit of the computer alone tells nobody anything.
+    # Limits of the computer alone do not help a reader.
     return f"{least:g} or more" if most == LARGEST_INTEGER else f"{least:g} to {most:,.10g}"
 
 

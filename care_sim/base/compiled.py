@@ -1,8 +1,7 @@
 """Compiled functions (numba), whose machine code is kept for later processes.
 
-Numba recompiles a function when its own file changes, and does not look further. Here a file of
-kernels may use compiled functions, named tuples and constants of other files: what is kept is
-also told by those.
+Numba recompiles a function only when its own file changes. Here a file of kernels may use compiled
+functions, named tuples and constants of other files, so kept code also depends on those.
 """
 
 import hashlib
@@ -21,14 +20,14 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 
 def compiled(*, brief: bool = False, **options: Any) -> Callable[[_F], _F]:
-    """Compile a function at its first call; `options` are those of `numba.njit`. While it runs,
-    other threads of Python may run, too, unless it is `brief`.
+    """Compile a function at its first call; `options` are those of `numba.njit`. Other Python
+    threads may run meanwhile, unless the function is `brief`.
 
     The code is kept beside the file, or in the user's cache folder, or where NUMBA_CACHE_DIR says.
     Where none of these can be written, every process compiles anew. With NUMBA_DISABLE_JIT=1
     functions stay Python, for debuggers and measures of coverage.
     """
-    # Whoever lets another thread in has to wait until that one lets it in again.
+    # Releasing the GIL costs a wait to reacquire it.
     nogil = not brief
 
     def make(function: _F) -> Any:
@@ -50,8 +49,9 @@ def compiled(*, brief: bool = False, **options: Any) -> Callable[[_F], _F]:
 
 @cache
 def _sources_digest(name: str) -> str:
-    """Hash of all that is compiled into the functions of a module: its source, the constants that
-    it holds or imports, and the same of the modules whose functions and named tuples it uses.
+    """Return a hash of all that is compiled into a module's functions. Covers its source, the
+    constants that it holds or imports, and the same of the modules whose functions and named tuples
+    it uses.
     """
     # Numba writes constants of the module into the machine code; imported ones are among them.
     module = sys.modules[name]
@@ -74,7 +74,7 @@ def _used_modules(module: ModuleType) -> Iterator[str]:
 
 
 class _CompileNotice(event.Listener):  # type: ignore[misc]
-    """Tells a terminal, once per process, that the first use on a machine takes its time."""
+    """Prints a notice once per process when the first use on a machine compiles."""
 
     def on_start(self, event: Any) -> None:
         """A function is compiled, not read from what is kept."""

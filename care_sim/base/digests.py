@@ -23,18 +23,18 @@ MOST_FILES = 10_000
 CODE = (".py", ".so", ".pyd")
 """Endings of files that a process loads once."""
 _VIEWS = ("/proc/", "/sys/", "/dev/fd/", "/dev/std")
-"""How views of the system begin: nobody's files, which change from moment to moment."""
+"""Paths of the system's views, which are not files and change all the time."""
 Stamp = tuple[int, ...]
 """Numbers of a file that differ after the file is written."""
 
 STEP = 1e-4
-"""Metres, radians, metres per second: what measured numbers are rounded to. A whole episode
-computed with other features of the processor moves poses by less than 1e-13, and the float32 ranges
-of an observation by their last bit, 4e-6; what an outcome rests on (sizes, margins, the spacing of
-rays) is centimetres."""
+"""Rounding step of measured numbers: metres, radians, metres per second. With other features of the
+processor, poses of a whole episode move by less than 1e-13. The float32 ranges of an observation
+move by their last bit, 4e-6. Outcomes depend on centimetres: sizes, margins, the spacing of rays.
+"""
 SHIFT = (5**0.5 - 1) / 2
-"""Shares of a step by which the borders between steps lie beside the round numbers that scenes are
-made of (0, 0.05, 1.5, a half of anything): a number on a border would be rounded by its last bit.
+"""Offset of the borders between steps from round numbers, in steps. Scenes are made of round
+numbers (0, 0.05, 1.5, a half of anything). A number on a border would be rounded by its last bit.
 """
 _LARGEST = 2.0**61
 _INFINITE = 2**62
@@ -42,8 +42,8 @@ _NONE = 2**62 + 1
 
 
 def file_digest(path: Path) -> str | None:
-    """Hash of the content of a file, or of the files below a folder and their names; empty where
-    there is neither, None of a folder with more than `MOST_FILES`.
+    """Hash a file's content, or the names and contents of the files below a folder. Returns an
+    empty text if neither exists, None for a folder with more than `MOST_FILES`.
     """
     # `os.path` takes every text for a path: a table of a recording may hold any.
     if not os.path.exists(path):
@@ -74,7 +74,7 @@ def data_digest(paths: Iterable[Path]) -> str:
 
 
 def combined_digest(digests: Iterable[str]) -> str:
-    """One hash of several, in their order."""
+    """Combine several hashes, in their order, into one."""
     return hashlib.sha256(" ".join(digests).encode()).hexdigest()[:16]
 
 
@@ -122,7 +122,7 @@ def _is_compiled(path: Path) -> bool:
 
 
 def paths_in(value: object) -> Iterator[Path]:
-    """The files and folders that a parameter names, from here; of a list those of its items."""
+    """Return the files and folders that a parameter, or a list's items, names."""
     if isinstance(value, list | tuple):
         for item in value:
             yield from paths_in(item)
@@ -134,9 +134,12 @@ def paths_in(value: object) -> Iterator[Path]:
 
 
 def entry_files(entry: EntryPoint) -> dict[str, Path] | None:
-    """The files by name that decide what an installed policy, detector, scenario or source does. A
-    package: all files in its folder. A single module: its file, and code beside it unless it was
-    installed. Both: the files in `files`. None where its code is in no file, or in too many.
+    """Return, by name, the files that decide what an installed policy, detector, scenario or source
+    does.
+
+    For a package: all files in its folder. For a single module: its file, and code beside it unless
+    it was installed. For both: the files in `files`. Returns None where the code is in no file, or
+    in too many.
 
     Raises InvalidInput for `files` that are no names, or that are missing.
     """

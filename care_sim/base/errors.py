@@ -23,8 +23,8 @@ _LIBRARIES = [Path(folder) for folder in dict.fromkeys(_FOLDERS)]
 
 
 def foreign_place(error: BaseException) -> str:
-    """File and line, in brackets after a space, where an error left the code of a user or of a
-    package that adds something to the benchmark; empty where no such code was running.
+    """Return " (file and line)" where an error left foreign code, else an empty text. Foreign code
+    is a user's own, or a package that adds something to the benchmark.
     """
     # The innermost one: what it calls is ours or a library's, and was called wrongly.
     return next((_place(*at) for at in _frames(error) if _is_foreign(at[0])), "")
@@ -45,7 +45,7 @@ def _place(frame: FrameType, line: int) -> str:
 
 
 def class_place(kind: type) -> str:
-    """A class with its file and line, in brackets after a space; empty where it has no file."""
+    """Return " (file and line)" of a class; empty where it has no file."""
     try:
         _, line = inspect.getsourcelines(kind)
         return f" (class {kind.__name__}, {Path(inspect.getfile(kind)).name}, line {line})"
@@ -54,7 +54,7 @@ def class_place(kind: type) -> str:
 
 
 def _is_foreign(frame: FrameType) -> bool:
-    """Whether the code of a frame is neither ours nor that of a library which adds nothing."""
+    """Return True for code of neither the benchmark nor a library that adds nothing to it."""
     file = Path(frame.f_code.co_filename)
     # What Python itself makes, such as the methods of dataclasses, has a name in brackets.
     if not file.is_absolute() or file.is_relative_to(_OURS):
@@ -85,7 +85,7 @@ def _top(module: str) -> str:
 _QUOTED = 120
 """Characters of a value that a message quotes."""
 _MOST_NAMES = 80
-"""Known names that a message lists; of more it tells the first, the last and how many."""
+"""Known names that a message lists. A longer list shows the first, the last and the count."""
 LONGEST = 2000
 """Characters of a complaint, at the most."""
 _SAID = 300
@@ -113,7 +113,7 @@ class BrokenScenario(InvalidInput):
 
 
 class BrokenSource(InvalidInput):
-    """A source of somebody's own whose code fails, or gives what ours cannot play."""
+    """A user's source whose code fails, or returns something that cannot be played."""
 
 
 class MissingExtra(ImportError):
@@ -121,8 +121,8 @@ class MissingExtra(ImportError):
 
 
 def unknown(kind: str, name: object, known: Iterable[str], hint: str = "") -> InvalidInput:
-    """The error for a name that is not among the known ones: it tells a `hint` and the nearest
-    first, then all of them, and the command that says what each is.
+    """Return the error for an unknown name. The error gives a `hint`, the nearest name, all names,
+    and the command that lists them.
     """
     names = sorted(known)
     told = [f"unknown {kind} {shown(name if isinstance(name, str) else shown(name))}"]
@@ -150,7 +150,7 @@ def print_lines(*lines: str, file: TextIO | None = None) -> None:
 
 
 def report_problems(problems: Sequence[str]) -> None:
-    """Print them, one per line, where complaints go."""
+    """Print problems to standard error, one per line."""
     for problem in problems:
         # In one write: workers print at once.
         print(f"care-sim: {one_line(problem)}\n", end="", file=sys.stderr)
@@ -184,14 +184,14 @@ def _text(error: BaseException, most: int = _SAID) -> str:
 
 
 def is_own_fault(error: BaseException) -> bool:
-    """Whether an error tells that code of the user's own failed, not that its input is bad. What
-    failed is among its causes.
+    """Return True if the user's own code failed, False if its input was bad. The failure is among
+    the error's causes.
     """
     if isinstance(error, BrokenSource):
         return True
     link: BaseException | None = error
     while link is not None:
-        # What foreign code refuses by itself is bad input, whatever it knows it by.
+        # Anything that foreign code itself refuses is bad input.
         if isinstance(link, InvalidInput) and is_raised_by_foreign(link):
             return False
         # A scenario's parameters are checked before it is built: what is refused then, it did.
@@ -218,14 +218,12 @@ def shortened(text: str, most: int) -> str:
 
 
 def one_line(text: str) -> str:
-    """The text on one line; what a terminal would not show is written as escapes."""
+    """Return the text on one line, with invisible characters as escapes."""
     return printable(" ".join(text.split()))
 
 
 def printable(text: str) -> str:
-    """The text with what a terminal or a file would obey rather than show (control codes,
-    directions, halves of characters) written as escapes.
-    """
+    """Return the text with control codes, directions and halves of characters as escapes."""
     if text.isprintable():
         return text
     return "".join(
@@ -239,10 +237,10 @@ def printable_lines(text: str) -> str:
 
 
 def percent(budget: float) -> str:
-    """A budget as people read it."""
+    """Return a budget as a percentage."""
     return f"{100 * budget:.3g}%"
 
 
 def counted(count: int, unit: str) -> str:
-    """A number of things, as a sentence says it."""
+    """Return a number of things in words."""
     return f"{count:,} {unit}{'' if count == 1 else 's'}"

@@ -101,7 +101,7 @@ def _load_libusb() -> None:
 
 
 @contextmanager
-def silenced(descriptor: int) -> Iterator[None]:
+def silence_output(descriptor: int) -> Iterator[None]:
     """Nothing that is written to a file descriptor comes through while this lasts."""
     # C keeps a buffer of its own. What it holds from before must leave it while the descriptor
     # still leads out, and what is printed meanwhile must leave it before the descriptor does again.

@@ -1,9 +1,8 @@
-"""Files that are there whole or not at all, and JSON from a user's files. Every file that CARE-Sim
-writes goes through here, but for journals.
+"""Files that are written whole or not at all, and JSON from a user's files.
 
-A program may be ended at any time, and a disk may be full. A file that is written in its own place
-is then cut short, and the old one is gone. So content goes to a file beside it, on the same file
-system, where a move is one step that cannot be half done.
+Every file that CARE-Sim writes goes through here, except journals. A program may be ended at any
+time, and a disk may be full. A file written in place would then be cut short, and the old one lost.
+So content goes to a file beside it, on the same file system, where a move cannot be half done.
 """
 
 import errno
@@ -30,7 +29,7 @@ JSON = rb"\s*[{[]"
 SVG = rb"<\?xml|<svg"
 ZIP = rb"PK"
 RERUN = rb"RRF"
-"""What files of these kinds begin with, as patterns. Weights and checkpoints are ZIP."""
+"""First bytes of each kind of file, as patterns. Weights and checkpoints are ZIP."""
 
 MOST_BYTES = 2**28
 """Bytes of a file of JSON: more than the longest of ours, the configurations of a study (100,000
@@ -47,11 +46,11 @@ _MORE_BYTES = 2**16
 
 @contextmanager
 def replacing(path: Path, kind: bytes = b"") -> Iterator[Path]:
-    """Yield a file to write to, with the same ending, which takes the place of `path` in one move
-    at the end: readers see the old file or the new one. The file replaces a link at `path`: nothing
-    is written through a link.
+    """Yield a file to write to, which replaces `path` in one move at the end. Readers see the old
+    file or the new one. The yielded file has the same ending. It replaces a link at `path`, and
+    never writes through it.
 
-    Raises what `check_output` does, before anything is computed; an error of writing names `path`.
+    Raises as `check_output` does, before anything is computed. An error of writing names `path`.
     """
     check_output(path, kind)
     place = path.absolute()
@@ -63,15 +62,15 @@ def replacing(path: Path, kind: bytes = b"") -> Iterator[Path]:
         unfinished.replace(place)
 
 
-def told_if_replaced(path: Path) -> str:
-    """The path as it is told when it is about to be written, and whether something lies there."""
+def describe_output(path: Path) -> str:
+    """Return the path as messages show it, and whether it exists."""
     return f"{path} (the earlier one is replaced)" if path.exists() else str(path)
 
 
 def check_output(path: Path, kind: bytes = b"") -> None:
-    """Raise InvalidInput for a `path` that nothing can be written to, that somebody is writing
-    already, or that holds a file which does not begin like one of `kind`. Raise OSError where
-    writing is not allowed. The folder is made.
+    """Raise InvalidInput for a `path` that cannot be written, that another process is writing, or
+    that holds a file of another `kind`. Raise OSError where writing is not allowed. The folder is
+    made.
     """
     # What stands there decides first. Then a file is made beside it and removed again, which tells
     # at once what the system would not allow at the end.
@@ -89,8 +88,8 @@ def check_output(path: Path, kind: bytes = b"") -> None:
 
 
 def check_no_link(path: Path) -> None:
-    """Raise InvalidInput where a file that grows has another name, or where it, or a folder inside
-    an output folder, is a symbolic link: the target may lie anywhere.
+    """Raise InvalidInput for hard links and symbolic links, of a file that grows or a folder in an
+    output folder. Their target may lie anywhere.
     """
     if path.is_symlink() or (path.is_file() and path.stat().st_nlink > 1):
         raise InvalidInput(f"{path} is a link, and links are not followed here: remove it first")
@@ -103,7 +102,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def why_unwritable(path: Path) -> str | None:
-    """Why a file cannot grow, None where it can. Libraries that write to it may not have told."""
+    """Return why a file cannot grow, None if it can. Libraries that write to it may hide errors."""
     try:
         with path.open("ab", buffering=0) as file:
             written = file.write(bytes(_MORE_BYTES))
@@ -116,7 +115,7 @@ def why_unwritable(path: Path) -> str | None:
 
 def _check_old(path: Path, kind: bytes) -> None:
     """Raise for a file that must not be replaced."""
-    # A move asks for rights to the folder alone. A file that may not be written is meant to stay.
+    # A move only needs write access to the folder. A write-protected file is meant to stay.
     if not os.access(path, os.W_OK):
         raise PermissionError(errno.EACCES, "it is there and may not be written", str(path))
     with path.open("rb") as old:
@@ -205,11 +204,12 @@ def json_content(path: Path, most: int = MOST_BYTES) -> Any:
 
 
 def listed_values(path: Path, most: int = MOST_BYTES) -> Iterator[Any]:
-    """The values of the list that a file of at most `most` bytes holds, one after the other: only
-    some of them lie in memory at a time. Each may be `MOST_CHARACTERS` long.
+    """Yield the values of the list in a file of at most `most` bytes. Only some of them are in
+    memory at a time. Each may be `MOST_CHARACTERS` long.
 
-    Raises OSError for a file that cannot be read, ValueError as `check_file_size` does, for what is
-    no JSON or no list, and for a value too deep for Python; values before it have come by then.
+    Raises OSError for a file that cannot be read, and ValueError as `check_file_size` does. Raises
+    ValueError, after the values before it, for text that is not JSON, not a list, or too deep for
+    Python.
     """
     check_file_size(path, most)
     decode = json.JSONDecoder().raw_decode

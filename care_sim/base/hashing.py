@@ -12,7 +12,7 @@ _GOLDEN, _ONE, _ELEVEN = np.uint64(0x9E3779B97F4A7C15), np.uint64(1), np.uint64(
 
 
 @compiled()
-def finalised(number: np.uint64) -> np.uint64:
+def finalise(number: np.uint64) -> np.uint64:
     """The finaliser of SplitMix64 (Steele, Lea and Flood 2014), which leaves no trace of its
     input.
     """
@@ -24,7 +24,7 @@ def finalised(number: np.uint64) -> np.uint64:
 @compiled()
 def mixed(key: np.uint64, number: int) -> np.uint64:
     """The key below a key with a number from 0 up: SplitMix64 at its step `number`."""
-    return finalised(key + (np.uint64(number) + _ONE) * _GOLDEN)
+    return finalise(key + (np.uint64(number) + _ONE) * _GOLDEN)
 
 
 @compiled()

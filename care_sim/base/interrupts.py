@@ -36,37 +36,37 @@ SOON_S = 0.02
 
 
 def end_at_once() -> None:
-    """From now on an interrupt ends the process: one line, and nothing is waited for."""
+    """Let later interrupts end the process at once, with one line."""
     _listen(_end)
 
 
-def raise_them() -> None:
-    """From now on an interrupt is a KeyboardInterrupt, raised where it is not lost: one that falls
-    into an import, which may turn it into another error, comes after it, or with the next one; one
-    that falls into code whose errors nobody can catch (finalisers, callbacks) comes again.
+def raise_interrupts() -> None:
+    """Raise later interrupts as KeyboardInterrupt, where they are not lost.
+
+    An import may turn an interrupt into another error: the interrupt is then raised after the
+    import, or with the next one. Errors in finalisers and callbacks cannot be caught: an interrupt
+    in them is raised again.
     """
     _listen(_raise)
     signal.signal(signal.SIGALRM, _raise)
-    sys.unraisablehook = _come_again
+    sys.unraisablehook = _raise_again
 
 
 def end_in_silence() -> None:
-    """From now on an interrupt is the system's to handle: all is said, and the interpreter is
-    ending.
-    """
+    """Leave later interrupts to the system, since the interpreter is ending."""
     signal.setitimer(signal.ITIMER_REAL, 0)
     _listen(signal.SIG_DFL)
 
 
 @contextmanager
-def held_back() -> Iterator[None]:
-    """Interrupts wait for the end of the block, for what must not be left half done."""
+def hold_interrupts() -> Iterator[None]:
+    """Hold interrupts back until the end of the block, for work that must not be left half done."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     # Only handlers of Python can wait in a list. What is ignored, or the system's, stays so.
     waiting: list[int] = []
-    with _deaf():
+    with _defer_signals():
         handlers = {number: signal.getsignal(number) for number in _HEARD}
         before = {number: handler for number, handler in handlers.items() if callable(handler)}
         for number in before:
@@ -74,7 +74,7 @@ def held_back() -> Iterator[None]:
     try:
         yield
     finally:
-        with _deaf():
+        with _defer_signals():
             for number, handler in before.items():
                 signal.signal(number, handler)
         # One is enough: all end a command in the same way. It is raised when the handlers are back.
@@ -83,7 +83,7 @@ def held_back() -> Iterator[None]:
 
 
 @contextmanager
-def _deaf() -> Iterator[None]:
+def _defer_signals() -> Iterator[None]:
     """Handle signals that come meanwhile at the end, so that handlers change all at once."""
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, ())
     try:
@@ -128,7 +128,7 @@ def _imports(frame: FrameType | None) -> bool:
     return False
 
 
-def _come_again(lost: "sys.UnraisableHookArgs") -> None:
+def _raise_again(lost: "sys.UnraisableHookArgs") -> None:
     """Have an interrupt that nobody could catch raised once more, a moment later."""
     if issubclass(lost.exc_type, KeyboardInterrupt):
         signal.setitimer(signal.ITIMER_REAL, SOON_S)

@@ -1,8 +1,8 @@
 """Limits that the machine sets this process: cores, memory, processes, a folder for caches.
 
-The command `care-sim` checks the limits that a shell, a batch system or a container sets before it
-imports its libraries, which end a process in their own words where they find too little. So this
-module imports nothing that takes time.
+A shell, a batch system or a container may set limits. Libraries that find too little end a process
+with unclear messages. So the command `care-sim` checks limits before it imports its libraries, and
+this module imports nothing that takes time.
 """
 
 import errno

@@ -1,12 +1,12 @@
-"""Things that a user asks for by name: the built-in ones, and those that installed packages add.
+"""Registries of things that a user names: built-in ones, and those of installed packages.
 
-A package adds one through an entry point: its name is what the user writes, its object is a class
+A package adds one through an entry point. Its name is what the user writes. Its object is a class
 or another callable that makes the thing. Of two entries with one name the first on the path counts,
-as for modules. A built-in name cannot be taken. A kind whose entries have longer names says what
-the user writes of them.
+as for modules. A built-in name cannot be taken. A kind whose entries have longer names maps them to
+what the user writes.
 
-What no package adds is asked for by its place, as MODULE:OBJECT, where the module is found as
-Python finds it, or in the folder in which the program was started.
+Anything else is named by its place, MODULE:OBJECT. The module is found as Python finds it, or in
+the folder in which the program was started.
 """
 
 import inspect
@@ -51,12 +51,10 @@ _PLACE = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
 
 @dataclass(frozen=True)
 class Plugins(Generic[Made]):
-    """All things of one `kind`, such as "detector": the `built_in` makers by name, or entry points
-    that name them, and the entries of the entry-point `group`.
-
-    `faults` says in which ways a loaded object makes nothing of the kind; each is the end of a
-    sentence that begins with the object's place. `called` gives what the user writes for the name
-    of an entry.
+    """All things of one `kind`, such as "detector". `built_in` holds makers by name, or entry
+    points that name them. `group` holds the entries of installed packages. `faults` lists why a
+    loaded object cannot make the kind; each fault ends a sentence that begins with the object's
+    place. `called` maps an entry's name to what the user writes.
     """
 
     kind: str
@@ -72,7 +70,7 @@ class Plugins(Generic[Made]):
         return [*self.built_in, *sorted(set(self.entries()) - set(self.built_in))]
 
     def check(self, name: object) -> None:
-        """Raise InvalidInput for what is no name of this kind; of a class with its place."""
+        """Raise InvalidInput for an unknown name of this kind; a class is named with its place."""
         if inspect.isclass(name):
             place = f"{name.__module__}:{name.__qualname__}"
             asked = f"as {place!r}" if is_place(place) else "as MODULE:CLASS, from a module's top"
@@ -153,7 +151,7 @@ class Plugins(Generic[Made]):
         # Foreign code may raise anything; some leaves by `sys.exit`.
         except BaseException as error:
             raise InvalidInput(f"{error_line(error)}{_found_in(entry, error)}") from error
-        # The first fault is told; the others may follow from it.
+        # Report the first fault; the others may follow from it.
         for fault in self.faults(made):
             raise InvalidInput(f"{entry.value} {fault}")
         maker: Callable[..., Made] = made
@@ -167,9 +165,7 @@ def class_faults(made: Any) -> Iterator[str]:
 
 
 def dataclass_faults(made: Any, told: Container[str] = ()) -> Iterator[str]:
-    """Why a class makes nothing of the numbers that it is given, of which those `told` alone may be
-    without a default.
-    """
+    """Return why a class cannot take its parameters. Only those in `told` may lack a default."""
     yield from class_faults(made)
     # Without the decorator the numbers are attributes of the class, and nobody can set them.
     if "__dataclass_fields__" not in vars(made) and inspect.get_annotations(made):

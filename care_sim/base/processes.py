@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from multiprocessing import resource_tracker, util
 from typing import TypeVar
 
-from care_sim.base.interrupts import SIGNALS, held_back
+from care_sim.base.interrupts import SIGNALS, hold_interrupts
 
 _T = TypeVar("_T")
 
@@ -21,7 +21,7 @@ LOOK_S = 1.0
 """Seconds between two looks at whether the starter is there."""
 
 UNHEARD = {number for number in SIGNALS if number != signal.SIGTERM}
-"""What a terminal sends to all processes in it. SIGTERM is how a pool ends a worker."""
+"""Signals that a terminal sends to all its processes. Pools end workers by SIGTERM."""
 
 _LONGEST_FOLDER = 75
 """Bytes of the folder for temporary files: the address of a socket inside one of its folders holds
@@ -39,7 +39,7 @@ def starting() -> Iterator[None]:
     They search for modules where this one does: no file of the current folder stands for a library.
     """
     _shorten_socket_folder()
-    with held_back(), _safe_path():
+    with hold_interrupts(), _safe_path():
         # Blocked signals stay blocked over fork and exec: a new process is deaf before it runs a
         # line.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, UNHEARD)

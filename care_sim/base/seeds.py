@@ -1,19 +1,17 @@
-"""Seeds: which are for what, and the independent streams of random numbers that each holds.
+"""Seeds: the split that each belongs to, and its independent streams of random numbers.
 
-The splits of seeds are disjoint by construction; the table is in docs/seeds.md. No
-training episode can have a seed below 10,000, whatever `--seed` is, and nothing is chosen by a seed
-below 1,000 but `care-sector` and `place-hulls`, which were first tried on the streets 0 to 19. A
-study of several seeds takes them of one split; one episode, of a command or of an environment that
-is reset by hand, takes any. Where episodes differ by the recording and not by the seed
-(`CARE-Replay-v0`), hold out recordings.
+The splits are disjoint by construction; the table is in docs/seeds.md. No training episode has a
+seed below 10,000, whatever `--seed` is. Nothing is chosen by a seed below 1,000, except
+`care-sector` and `place-hulls`, which were first tried on the streets 0 to 19. A study of several
+seeds takes them from one split. A single episode takes any seed. Where episodes differ by the
+recording and not by the seed (`CARE-Replay-v0`), hold out recordings.
 
-Anybody with this package can draw the episodes of a public seed, and find the seed of an episode
-by what it begins with. A secret enters everything that is drawn: no observation then tells the
-seed, nor a seed the episode, but what a guess among all that the ranges of a scenario allow tells.
-NumPy's generators are not made for cryptography; to tell from the first numbers that a stream gave
-those that follow is years of computing (Bouillaguet, Martinez and Sauvage, ToSC 2020, on PCG64), no
-proof that it cannot be done. The random floor has a key of 64 bits (`care_sim.core.firing.floor`);
-trying all keys is years of computing, too.
+Anybody with this package can draw the episodes of a public seed, and find the seed from an
+episode's beginning. A secret enters all draws. An observation then reveals no more about the seed
+than a guess within the scenario's ranges. NumPy's generators are not cryptographic. Predicting a
+stream from its first numbers takes years of computing (Bouillaguet, Martinez and Sauvage, ToSC
+2020, on PCG64), which is not a proof. The random floor has a key of 64 bits
+(`care_sim.core.firing.floor`); trying all keys also takes years.
 """
 
 import hmac
@@ -36,15 +34,14 @@ SPLITS = {
     "train": range(TRAINING, LAST),
 }
 FRESH = range(2**31, 2**32)
-"""`care-sim benchmark --fresh N` draws from it: nothing is learned, chosen or published by it."""
+"""`care-sim benchmark --fresh N` draws from it. Nothing is learned, chosen or published with it."""
 SEALED_FROM = 2**32
 """Seeds that a secret salt draws lie from here on."""
 
 
 def split_of(seeds: Iterable[int]) -> str:
-    """The one split that all `seeds` are of.
-
-    Raises InvalidInput for seeds of several splits, for a seed of none, and for none at all.
+    """Return the split of all `seeds`. Raises InvalidInput for seeds of several splits or of none,
+    and without seeds.
     """
     found: dict[str, int] = {}
     for seed in seeds:
@@ -93,8 +90,8 @@ def streams(entropy: tuple[int, ...], count: int, secret: str = "") -> list[np.r
 
 
 def secret_entropy(what: str, entropy: tuple[int, ...], secret: str) -> int:
-    """256 bits of what is drawn, its seed and a secret (HMAC-SHA-256), of which neither can be
-    told. An episode and a street of one seed have nothing in common.
+    """Return 256 bits of a name, a seed and a secret (HMAC-SHA-256), which reveal neither. An
+    episode and a street of one seed have nothing in common.
     """
     # As plain decimal numbers, so that an integer of NumPy gives what one of Python does.
     message = " ".join([what, *(str(int(number)) for number in entropy)])

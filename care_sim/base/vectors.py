@@ -19,9 +19,8 @@ def attribute_of_each(env: VectorEnv[Any, Any, Any], name: str) -> list[Any]:
 
 
 def shared_attribute(env: VectorEnv[Any, Any, Any], name: str) -> Any:
-    """An attribute that all worlds of a vector environment have alike.
-
-    Raises AttributeError where there is none, InvalidInput where worlds differ in it.
+    """Return an attribute that all worlds of a vector environment share. Raises AttributeError
+    where it is missing, InvalidInput where worlds differ in it.
     """
     first, *others = attribute_of_each(env, name)
     if any(other != first for other in others):

@@ -6,4 +6,4 @@ published trails are `published.parquet`, which `published` reads.
 
 ALL_EPISODES = 10_000
 CERTIFIED_EPISODES = 3_050
-"""What is played unless more is asked for. With 32 policies the last pair meets in number 3,020."""
+"""Episodes played by default. With 32 policies the last pair meets in number 3,020."""

@@ -28,9 +28,7 @@ CLOSED = (
 STREET = "CARE-Street-v0"
 REPLAY = "CARE-Replay-v0"
 _ENVIRONMENTS = (*CLOSED, STREET, REPLAY)
-"""What an environment is drawn from: the closed loop takes three quarters. Written out, as the
-policies are.
-"""
+"""Environments to draw from; three quarters are closed loop. Written out, as the policies are."""
 
 CERTIFIED_POLICIES = (
     "full",

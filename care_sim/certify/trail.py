@@ -27,8 +27,8 @@ TRAIL_STAGES = (
     "returns",
     "detections",
 )
-"""Of every keyframe, in order. The configuration comes before the first, the outcome after the
-last.
+"""Fields of every keyframe, in order. The configuration comes before the first keyframe, the
+outcome after the last.
 """
 _CLOSED_LOOP_OUTCOME = (
     "detection_distance_m",
@@ -47,8 +47,8 @@ STAGE_BYTES = 3
 
 
 class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Plays one episode of the list, whatever `reset` is told, and keeps its trail. Steps after the
-    end have no effect.
+    """Plays one episode of the list and keeps its trail. The arguments of `reset` and steps after
+    the end have no effect.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], episode: Drawn):

@@ -14,8 +14,9 @@ _NOT_PLAYED = "not played"
 
 @dataclass(frozen=True)
 class Verdict:
-    """The `found` trails, which were played of the episodes `asked` for, and how they differ from
-    the published ones: by number the stage and keyframe at which an episode differs first.
+    """The verdict on played trails. `asked` are the episodes to play, `found` their trails.
+    `differing` maps an episode's number to the stage and keyframe of its first difference from the
+    published trail.
     """
 
     found: Trails

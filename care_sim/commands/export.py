@@ -93,7 +93,7 @@ def export_minari(options: ExportMinari) -> int:
     returns: list[float] = []
     shown_configs = _shown(configs, "episodes")
     with configs[0].make_env() as env, warnings.catch_warnings():
-        # Minari asks for an author, an e-mail and a link, which are the publisher's to give.
+        # Minari wants an author, an e-mail and a link, which only the publisher knows.
         warnings.filterwarnings("ignore", category=UserWarning, module="minari")
         episodes = _played(env, shown_configs, returns)
         try:
@@ -108,8 +108,8 @@ def export_minari(options: ExportMinari) -> int:
                 data_format="parquet",
             )
         except BaseException:
-            # Minari makes the folder before it asks for the first episode. Until then, the
-            # folder may be another process's.
+            # Minari makes the folder before it requests the first episode. Until then, the folder
+            # may belong to another process.
             if inspect.getgeneratorstate(episodes) != inspect.GEN_CREATED:
                 shutil.rmtree(folder, ignore_errors=True)
             raise

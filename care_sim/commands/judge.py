@@ -52,7 +52,7 @@ def judge(options: Judge) -> int:
     _check_folder(options)
     judged: dict[str, dict[str, JudgedScene]] = {name: {} for name in names}
     problems = []
-    # Whatever ends it, what is judged by then is told.
+    # Print finished judgements, whatever ends the command.
     try:
         with (
             processes(options.workers) as pool,

@@ -13,7 +13,7 @@ from care_sim.base.errors import (
     print_lines,
     report_problems,
 )
-from care_sim.base.files import check_output, told_if_replaced, write_text
+from care_sim.base.files import check_output, describe_output, write_text
 from care_sim.base.interrupts import DONE, FAILED
 from care_sim.commands.options.results import Leaderboard
 from care_sim.commands.shared.console import TableConsole
@@ -62,7 +62,7 @@ def _show(options: Leaderboard, sets: Sequence[Sequence[BudgetResult]]) -> None:
     check_output(page)
     for name in names:
         check_figure(options.out / name)
-    told = told_if_replaced(page)
+    told = describe_output(page)
     blocks = [_HEAD]
     for name, own in zip(names, sets, strict=True):
         save(leaderboard_figure(own), options.out / name)

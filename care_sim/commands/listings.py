@@ -16,7 +16,7 @@ _LINES = {
     "sensors": "sensors.setups:setup_lines",
     "engines": "sensors.engines:engine_lines",
 }
-"""What gives the lines of each list. Its room alone is imported."""
+"""Functions that return the lines of each list. Only the room of the list is imported."""
 
 
 def show(options: List) -> int:

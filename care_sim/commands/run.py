@@ -32,7 +32,7 @@ from care_sim.training.agents import find_agent, shipped_agents
 
 _RECORD = Path("runs/run.rrd")
 _POLICY, _BUDGET = "care", 0.1
-"""What plays where nothing is said."""
+"""The default policy."""
 
 
 def run(options: Run) -> int:

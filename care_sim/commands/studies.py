@@ -34,10 +34,10 @@ from care_sim.commands.shared.selection import (
     check_values,
     common_of,
     expanded,
-    in_turn,
     named_after,
     playable,
     source_named,
+    take_values,
 )
 from care_sim.envs import ENVIRONMENT_IDS
 from care_sim.scenarios.ncap.table import TESTS
@@ -92,7 +92,7 @@ def protocol(options: Protocol) -> int:
     """Play the paper's first-sighting protocol (Secs. 3 and 5)."""
     check_values(options, "budgets")
     common = _common(options, options.policies)
-    latencies = in_turn(options.camera_latencies, "camera_latency", common)
+    latencies = take_values(options.camera_latencies, "camera_latency", common)
     # The floors of a scene have consecutive seeds, from --floor-seed on.
     first = common.pop("floor_seed")
     plays = partial(
@@ -249,8 +249,8 @@ def sweep(options: Sweep) -> int:
     policies, left_out = playable(
         options.policies, lambda name: grid(scenarios, [name], options.budgets[:1], [0], **common)
     )
-    rates = in_turn(options.false_negative_rates, "false_negative_rate", common)
-    latencies = in_turn(options.camera_latencies, "camera_latency", common)
+    rates = take_values(options.false_negative_rates, "false_negative_rate", common)
+    latencies = take_values(options.camera_latencies, "camera_latency", common)
     seeds = seeds_of(options.seeds)
     configs = grid(scenarios, policies, options.budgets, seeds, rates, latencies, **common)
     return play_study(options, "sweep", configs, "sweep", [*unbuilt, *left_out])

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import fields
 
 from care_sim.base.errors import InvalidInput, print_lines
-from care_sim.base.files import told_if_replaced
+from care_sim.base.files import describe_output
 from care_sim.commands.options.learning import Curves, Learner
 from care_sim.commands.shared.agent_play import AgentPlay
 from care_sim.commands.shared.console import TableConsole
@@ -72,7 +72,7 @@ def curves(options: Curves) -> int:
     groups = grouped_runs(map(read_run, options.folders))
     stem = stem_of(options.out)
     check_figure(stem)
-    told = told_if_replaced(stem.with_name(f"{stem.name}.png"))
+    told = describe_output(stem.with_name(f"{stem.name}.png"))
     save(curves_figure(groups), stem)
     TableConsole().print(curves_table(groups).rich())
     print_lines(f"Figure: {told}")

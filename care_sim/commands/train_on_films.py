@@ -53,11 +53,11 @@ def train_detector(options: TrainDetector) -> int:
 
 def scenes_of(options: Trained, played: dict[str, Any]) -> Scenes | None:
     """Return the scenes that the options name, None for generated worlds. `played` are the options
-    of `protocol` that play the weights.
+    of `protocol` that play the weights. First checks what every training needs: PyTorch and a file
+    to write.
 
-    First check what every training needs: PyTorch and a file to write. Raises InvalidInput where a
-    source cannot be read, lacks a split or has too few scenes, for a scene that is in both parts,
-    and for options of sources without one.
+    Raises InvalidInput for a source that cannot be read, lacks a split or has too few scenes.
+    Raises InvalidInput for a scene in both parts, and for source options without a source.
     """
     options.check_source()
     # Before a source is hashed or a world is played: both take minutes.

@@ -1,22 +1,22 @@
 """The fixed braking controller: the same for every policy, and stated here in full.
 
-A track counts when its box, widened by `brake_side_margin_m` on both sides, overlaps the strip that
-the ego sweeps straight ahead, now or at any time within `brake_horizon_s` if it keeps its velocity.
-Only what lies ahead of the front bumper counts. A track seen once has no velocity and counts only
-where it is.
+A track counts when its box overlaps the strip that the ego sweeps straight ahead. The box is
+widened by `brake_side_margin_m` on both sides. The overlap may be now or within `brake_horizon_s`
+at constant velocity. Only what lies ahead of the front bumper counts. A track seen once has no
+velocity and counts only where it is.
 
-The brake goes on when the gap to a counting track is at most the ego's stopping distance,
-v * t_reaction + v^2 / (2 b) + s_0, less what a track that drives ahead needs to stop itself,
-v_x^2 / (2 b) (Shalev-Shwartz et al. 2017, RSS). It acts with b at the first keyframe that is at
+The brake goes on when the gap to a counting track is at most the ego's stopping distance, v *
+t_reaction + v^2 / (2 b) + s_0. The stopping distance of a track that drives ahead, v_x^2 / (2 b),
+is subtracted (Shalev-Shwartz et al. 2017, RSS). It acts with b at the first keyframe that is at
 least `brake_reaction_s` later. It stays on while any counting track is not faster than the ego, and
 for `brake_release_s` after the last one. Then the ego gains speed at `comfort_mps2` up to its
 cruising speed. Numbers and sources are those of `care_sim.core.conditions`.
 
-With `brake_for_oncoming` the gap to a track with v_x < 0 is the least that it will have before it
-leaves the strip, at most `brake_horizon_s` after it has entered: x - |v_x| * t for x. So an ego
-that sees an oncoming car in time stands s_0 before all that the car will sweep, not in it. RSS for
-opposite directions has the other brake, too; a car that crosses the ego's way need not, and leaves
-the strip instead.
+With `brake_for_oncoming`, a track with v_x < 0 uses its smallest gap before it leaves the strip, x
+- |v_x| * t. That is at most `brake_horizon_s` after the track has entered. So an ego that sees an
+oncoming car in time stands s_0 before all that the car will sweep, not in it. RSS for opposite
+directions has the other brake, too; a car that crosses the ego's way need not, and leaves the strip
+instead.
 """
 
 import math
@@ -42,9 +42,9 @@ Rules = tuple[float, float, float, float, float, float, float, float, float]
 
 
 class BrakingRules(NamedTuple):
-    """Rules of the braking decision: those settings of `care_sim.core.conditions.DriverSettings`
-    that it uses, in its units; where the guarded strip begins, `front_m`, and its reach to either
-    side, `reach_m`; and the time between keyframes.
+    """Rules of the braking decision, in the units of `care_sim.core.conditions.DriverSettings`.
+    Adds where the guarded strip begins (`front_m`), its reach to either side (`reach_m`), and the
+    time between keyframes.
     """
 
     front_m: float

@@ -11,7 +11,7 @@ from care_sim.core.types import Tracks
 from care_sim.world.route import Route
 
 _NO_PACE_MPS = 1e-6
-"""Who goes sideways no faster does not leave."""
+"""Slower sideways motion does not count as leaving."""
 
 Turns = tuple[Floats, Floats]
 """Cosines and sines (n,) of headings."""
@@ -22,11 +22,10 @@ Footprint = tuple[float, float, float, float]
 
 
 def along_route(tracks: Tracks, route: Route, sensor: Frame) -> Tracks:
-    """The tracks as they would lie before a car that drives straight ahead.
-
-    x is metres along the route from where the sensor is, y metres to the left of the sensor's own
-    line along it; headings and velocities are relative to the route where it comes nearest to the
-    track. A track keeps its sizes and z.
+    """Return the tracks in the frame of the route, as if the car drove straight ahead. Here x is
+    metres along the route from the sensor, and y metres to the left of the sensor's own line along
+    the route. Headings and velocities are relative to the route at its nearest point to the track.
+    Sizes and z stay.
     """
     if not len(tracks):
         return tracks

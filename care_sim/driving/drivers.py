@@ -22,14 +22,12 @@ class HumanModel:
     """The competent and careful human driver of UN Regulation 157: its numbers, and how it brakes.
     Metres, seconds.
 
-    Annex 3 of the 01 series of amendments (Annex 4, Appendix 3, of the original text of 2021)
-    states them in its Table 1 and in the section on cutting in. The driver perceives a vehicle that
+    The source is Annex 3 of the 01 series of amendments, its Table 1 and the section on cutting in.
+    In the original text of 2021 it is Annex 4, Appendix 3. The driver perceives a vehicle that
     leaves the middle of its lane, evaluates the risk, and after a delay brakes harder and harder up
-    to a limit.
-
-    The table's last line, 0.85 g after both vehicles overlap fully, is that of an emergency braking
-    system (UN Regulation 152), no driver's; it is left out, as in the Joint Research Centre's
-    program of the model (github.com/ec-jrc/JRC-FSM).
+    to a limit. The table's last line, 0.85 g after both vehicles overlap fully, is left out. It
+    describes an emergency braking system (UN Regulation 152), and no driver. The Joint Research
+    Centre's program of the model also leaves it out (github.com/ec-jrc/JRC-FSM).
     """
 
     lane_m: float = 3.5
@@ -94,15 +92,14 @@ class CarefulHuman:
     """The competent and careful human driver of UN Regulation 157, who brakes on tracks.
 
     It acts on tracks, as the fixed controller does, so that a late detection delays it. A track
-    ahead is in the way where its box overlaps the strip that the ego sweeps straight ahead, and it
-    cuts in where it moves towards that strip and its middle is more than `wander_m` off the middle
-    of the next lane. What has done either for `evaluation_s` is perceived as a risk. It is a danger
-    once its time to collision along the road is at most `danger_s`.
+    ahead is in the way where its box overlaps the strip that the ego sweeps straight ahead. It cuts
+    in where it moves towards that strip and its middle is more than `wander_m` off the middle of
+    the next lane. A track that has done either for `evaluation_s` is perceived as a risk. A risk is
+    a danger once its time to collision along the road is at most `danger_s`.
 
-    From the first danger on the driver brakes as `HumanModel` says, until no
-    perceived risk is slower than the ego. Then it holds its speed as long as a risk is ahead, and
-    without one gains speed at `comfort_mps2` up to its cruising speed: the regulation does not tell
-    what comes after the braking.
+    From the first danger on the driver brakes as `HumanModel` says, until no perceived risk is
+    slower than the ego. Then it holds its speed while a risk is ahead. Otherwise it accelerates at
+    `comfort_mps2` to its cruising speed. The regulation does not define the time after braking.
 
     `front_m` and `half_width_m` are the ego's extents seen from its sensor, metres; it cruises at
     `cruise_mps`.
@@ -202,7 +199,7 @@ class CruisingRules:
     standstill_m: float = 2.0
     """s_0, as of the controller."""
     moving_mps: float = 0.5
-    """What moves along the way faster than this drives ahead (tau_static of the paper)."""
+    """Speed along the way above which a track drives ahead (tau_static of the paper)."""
 
 
 class Cruising:

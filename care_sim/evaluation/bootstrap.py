@@ -1,16 +1,15 @@
-"""Paired bootstrap: how sure a difference is between two policies that met the same episodes.
+"""Paired bootstrap: intervals of differences between two policies in the same episodes.
 
-Episodes differ among each other, and that hides how two policies differ in one of them. What both
-share in an episode drops out of the difference of the pair. So pairs are resampled, never each
-policy by itself.
+Episodes differ from each other, which hides differences between policies. The difference of a pair
+cancels what both policies share in an episode. So pairs are resampled, never each policy by itself.
 
-`paired_difference` gives the intervals of the closed loop, over episodes, by way of
-`care_sim.evaluation.censoring`. `ratio_of_sums` gives the main intervals of the open-loop protocol,
-over scenes, in which every event weighs alike (`care_sim.evaluation.scene_contrasts`); beside them
-`paired_difference` gives those in which every scene does, and those over events.
+`paired_difference` computes the closed loop's intervals over episodes, through
+`care_sim.evaluation.censoring`. `ratio_of_sums` computes the main intervals of the open loop, over
+scenes, with equal weight per event (`care_sim.evaluation.scene_contrasts`). There
+`paired_difference` computes intervals with equal weight per scene, and intervals over events.
 
-All intervals are percentile intervals (Efron and Tibshirani 1994), seeded, and remembered: tables
-and pages ask for the same ones again.
+All intervals are percentile intervals (Efron and Tibshirani 1994), seeded, and cached, since tables
+and pages share them.
 """
 
 from collections.abc import Sequence
@@ -31,7 +30,7 @@ _ENDS = ((1 - INTERVAL_CONFIDENCE) / 2, 1 - (1 - INTERVAL_CONFIDENCE) / 2)
 Sums = tuple[ArrayLike, ArrayLike]
 """Numerators and denominators (n,) of a group of scenes, scene by scene."""
 _Group = tuple[tuple[float, ...], tuple[float, ...]]
-"""The same as tuples, by which a result is remembered."""
+"""The same as tuples, as keys of the cache."""
 
 
 class Interval(NamedTuple):
@@ -43,7 +42,7 @@ class Interval(NamedTuple):
 
 
 def paired_difference(ours: ArrayLike, theirs: ArrayLike) -> Interval:
-    """Mean of `ours - theirs` with its interval.
+    """Return the mean of `ours - theirs` with its interval.
 
     Both are (n,) and paired: entry i of each comes from the same episode. Differences that are all
     equal have that value for both ends. Raises InvalidInput for samples that are empty, of unequal
@@ -51,8 +50,8 @@ def paired_difference(ours: ArrayLike, theirs: ArrayLike) -> Interval:
     """
     a, b = _pairs(ours, theirs)
     differences = a - b
-    # Equal differences have equal resamples, and nothing is to be drawn. Subtraction leaves an
-    # error of the last bits of the samples, so it is their size that counts.
+    # Equal differences have equal resamples, so nothing is drawn. Subtraction errs in the last bits
+    # of the samples, so the tolerance follows their size.
     if _are_equal(differences, like=a):
         mean = float(differences.mean())
         return Interval(mean, mean, mean)
@@ -60,14 +59,17 @@ def paired_difference(ours: ArrayLike, theirs: ArrayLike) -> Interval:
 
 
 def ratio_of_sums(group: Sums, *, less: Sums | None = None) -> Interval:
-    """Ratio of the sums of a group of scenes with its interval; scenes are drawn with replacement.
+    """Return the ratio of the sums of a group of scenes with its interval; scenes are drawn with
+    replacement.
 
-    With `ours - theirs` as numerators and the events as denominators it is the difference of two
-    policies in which every event weighs alike, paired by scene. With a second group, `less`, its
-    ratio is taken off; scenes are then drawn within each group. Groups whose scenes all have one
-    ratio give the value for both ends. A denominator may be 0 where another of its group is not;
-    resamples that sum to 0 have no ratio and are ignored. Raises InvalidInput for sums that are
-    empty, of unequal length or not finite, and for denominators that are negative or all 0.
+    With `ours - theirs` as numerators and events as denominators, the ratio is the difference of
+    two policies with equal weight per event, paired by scene. With a second group, `less`, its
+    ratio is subtracted; scenes are then drawn within each group.
+
+    Groups whose scenes all have one ratio return the value for both ends. A denominator may be 0
+    where another of its group is not. Resamples that sum to 0 have no ratio and are ignored. Raises
+    InvalidInput for sums that are empty, of unequal length or not finite, and for denominators that
+    are negative or all 0.
     """
     # A ratio of sums, not a mean of ratios: every event weighs alike, whether its scene has many or
     # few. A scene is drawn as a whole, with its numerator and its denominator, since what happens
@@ -115,20 +117,21 @@ def _resampled_mean(differences: tuple[float, ...]) -> Interval:
 
 @lru_cache(maxsize=1)
 def _drawn(count: int) -> Integers:
-    """(resamples, count) rows that are drawn; remembered, since most tables compare policies on as
-    many episodes. They are the draws of `scipy.stats.bootstrap`, which takes three times as long.
+    """Return (resamples, count) drawn rows. Cached, since most tables compare policies on equally
+    many episodes. The draws equal those of `scipy.stats.bootstrap`, which takes three times as
+    long.
     """
     return np.random.default_rng(0).integers(0, count, (RESAMPLES, count))
 
 
 def _have_one_ratio(numerators: Floats, denominators: Floats) -> bool:
-    """Whether every scene has the ratio of the sums, or holds nothing of either."""
+    """Return True if every scene has the ratio of the sums, or zeros."""
     expected = numerators.sum() / denominators.sum() * denominators
     return _are_equal(numerators - expected, like=numerators)
 
 
 def _are_equal(values: Floats, like: Floats) -> bool:
-    """Whether all values are one number but for the last bits of numbers as large as `like`."""
+    """Return True if all values are equal up to the last bits of numbers as large as `like`."""
     return bool(np.ptp(values) <= 1e-12 * max(1.0, float(np.abs(like).max())))
 
 

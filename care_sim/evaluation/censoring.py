@@ -1,16 +1,16 @@
-"""Detection distances of actors that were never detected: censored, no zeros, and not dropped.
+"""Detection distances of actors that were never detected: censored values, neither zeros nor
+dropped.
 
-All that is known of such a distance is that it lies between 0 and that of the nearest scan that
-passed the actor by. In medians and quartiles it ranks below every detection, and nothing is
-interpolated with it.
+Such a distance is only known to lie between 0 and the distance of the nearest scan of the actor. In
+medians and quartiles it ranks below every detection, and nothing is interpolated with it.
 
-In a paired difference it enters at the upper end of its range, the reading that favours the policy
-that missed. The difference is then a bound on the true one, and says so. It is claimed only when it
-holds wherever in its range each censored distance lies. An example with one episode: ours detects
-at 15 m, theirs never, and the nearest scan of theirs passed at 4 m. Theirs lies between 0 and 4 m,
-so the true difference between 11 and 15 m. It is printed as "≥ 11 m". The cautious reading asks for
-the range's end that speaks most against us: theirs at 4 m, 11 m again, which is above 0. Had ours
-missed instead, at 4 m, against 15 m of theirs, the difference would lie between -15 and -11 m:
+In a paired difference it enters at the upper end of its range, which favours the policy that
+missed. The difference is then a bound on the true one, and is printed as a bound. It is claimed
+only if it holds for all values in the range of each censored distance. An example with one episode:
+ours detects at 15 m, theirs never, and their nearest scan was at 4 m. Theirs lies between 0 and 4
+m, so the true difference lies between 11 and 15 m. It is printed as "≥ 11 m". The cautious reading
+takes the end of the range that speaks most against us: theirs at 4 m, again 11 m, which is above 0.
+If ours missed at 4 m and theirs detected at 15 m, the difference would lie between -15 and -11 m:
 "≤ -11 m".
 """
 
@@ -24,14 +24,14 @@ import numpy as np
 from care_sim.evaluation.bootstrap import Interval, paired_difference
 
 FEWEST_PAIRS = 5
-"""Fewer pairs carry no claim: by chance alone, one set of four pairs in eight has differences of
-one sign (2 / 2^4), and then every resample has that sign.
+"""Fewest pairs of a claim. By chance alone, one set of four pairs in eight has differences of one
+sign (2 / 2^4), and then every resample has that sign.
 """
 
 
 class Reading(NamedTuple):
-    """A value measured in an episode; of a `censored` one is known that the truth lies between 0
-    and this.
+    """A value measured in an episode. The truth of a `censored` value lies between 0 and the
+    value.
     """
 
     value: float
@@ -49,7 +49,7 @@ class Quartiles:
 
 
 class Bound(StrEnum):
-    """How a printed difference bounds the true one; the value is the sign to print before it."""
+    """The sign before a printed difference that bounds the true one."""
 
     EXACT = ""
     AT_MOST = "≤"
@@ -59,10 +59,10 @@ class Bound(StrEnum):
 
 @dataclass(frozen=True)
 class Difference:
-    """A mean paired difference with its interval; the true one lies as `bound` says.
+    """A mean paired difference with its interval; `bound` relates it to the true one.
 
-    `cautious` is the same with every censored value at the end of its range that speaks most
-    against the difference.
+    `cautious` is the same difference with every censored value at the end of its range that speaks
+    most against it.
     """
 
     interval: Interval
@@ -72,10 +72,10 @@ class Difference:
 
     @property
     def excludes_zero(self) -> bool:
-        """Whether the interval excludes zero, whatever the censored values were; never of fewer
-        than 5 pairs.
+        """Return True if the interval excludes zero for all possible censored values; False for
+        fewer than 5 pairs.
         """
-        # On the side of the mean alone: where the cautious reading turns its sign, nothing is said.
+        # Only on the side of the mean: a cautious reading of opposite sign is no result.
         away = self.cautious.low > 0 if self.interval.mean > 0 else self.cautious.high < 0
         return away and self.pairs >= FEWEST_PAIRS
 
@@ -88,8 +88,8 @@ def quartiles(readings: Sequence[Reading]) -> Quartiles | None:
     ranked = [-1.0] * censored + sorted(
         reading.value for reading in readings if not reading.censored
     )
-    # Any number below 0 ranks below every distance. A quartile whose lower neighbour is censored is
-    # not known: the value that is interpolated with that number is dropped.
+    # A number below 0 ranks below every distance. A quartile whose lower neighbour is censored is
+    # unknown, so its interpolated value is dropped.
     shares = (0.25, 0.5, 0.75)
     values = np.quantile(ranked, shares).tolist()
     low, median, high = (
@@ -102,16 +102,18 @@ def quartiles(readings: Sequence[Reading]) -> Quartiles | None:
 def difference(ours: Sequence[Reading], theirs: Sequence[Reading]) -> Difference:
     """Mean of `ours - theirs`, entry by entry. Raises InvalidInput as `paired_difference` does."""
     interval = paired_difference(_most(ours), _most(theirs))
-    # What speaks most against a difference: ours as small as may be where ours seems larger.
+    # The cautious reading makes ours as small as possible where ours seems larger.
     against = (_least(ours), _most(theirs)) if interval.mean > 0 else (_most(ours), _least(theirs))
     cautious = paired_difference(*against)
     return Difference(interval, _bound(ours, theirs), len(ours), cautious)
 
 
 def _bound(ours: Sequence[Reading], theirs: Sequence[Reading]) -> Bound:
-    """How the mean of `ours - theirs`, each censored value at its most, bounds the true mean."""
-    # The true value of a censored one is at most that. Where only ours has some, the true
-    # difference is smaller or equal; where only theirs has some, larger or equal; where both have
+    """Return how the mean of `ours - theirs`, with each censored value at its maximum, bounds the
+    true mean.
+    """
+    # The true value is at most the censored one. If only ours has censored values, the true
+    # difference is smaller or equal. If only theirs has some, it is larger or equal. If both have
     # some, either.
     ours_missed = any(reading.censored for reading in ours)
     theirs_missed = any(reading.censored for reading in theirs)

@@ -1,9 +1,9 @@
 """The chance that a detector reports each newcomer in its first keyframe, given its returns.
 
-A measured detector (`care_sim.perception.measured`) and the graded proxy detect by chance, and the
-chance follows from the returns on an object alone. In the first keyframe of an object it is exact:
-nothing that was drawn before could have moved a cell towards the object or away from it. Later it
-would not be: luck lasts, and a lucky object is tracked.
+A measured detector (`care_sim.perception.measured`) and the graded proxy detect by chance. The
+chance depends only on the returns on an object. It is exact in the object's first keyframe, since
+no earlier draw could have moved a cell towards or away from the object. Later it would be biased:
+luck lasts, and a lucky object is tracked.
 """
 
 from collections.abc import Callable, Mapping
@@ -24,7 +24,7 @@ from care_sim.perception.proxy import chance
 from care_sim.sensors.annotated import Annotations, Cloud
 
 _Rule = Callable[[str, Floats, Floats], Floats]
-"""From a class, and the returns (n,) now and on average per sweep, to chances (n,)."""
+"""Maps a class, and returns (n,) now and on average per sweep, to chances (n,)."""
 
 
 class Chances:
@@ -39,7 +39,7 @@ class Chances:
 
     @classmethod
     def of(cls, detector: str, parameters: Mapping[str, Any], rig: Rig) -> "Chances | None":
-        """Return the meter of a detector; None where the chances of the detector are not known."""
+        """Return the meter of a detector, None if its chances are unknown."""
         alike = np.ones(len(rig.grid.heads))
         if detector == GRADED:
             return cls(_graded, np.ones(1), alike, rig)
@@ -58,7 +58,7 @@ class Chances:
             now = now / max(len(loop.handed.poses), 1)
         self._counts.insert(0, dict(zip(annotations.objects.tolist(), now.tolist(), strict=True)))
         del self._counts[len(self._weights) :]
-        # At the start there are fewer keyframes, and they weigh as much as all do later.
+        # The first keyframes have the total weight of all later ones.
         known = self._weights[: len(self._counts)]
         earlier = [
             [counts.get(each, 0.0) for counts in self._counts]

@@ -1,23 +1,22 @@
-"""The counts of a play by which allocators are compared: what it detects, and what it must not do.
+"""Counts of a play that compare allocators: detections, and unwanted actions.
 
-On a street or a recording they are
+Counts on a street or a recording:
 
 - `emerging`: newcomers that emerge, detected in their first keyframe;
 - `entering`: newcomers that enter the range, detected in their first keyframe;
 - `kept`: object frames within range that are detected, of all objects;
 - `people kept`: the same of people on foot and on bicycles.
 
-The line between emerging and entering is that of `care_sim.evaluation.strata`: an object emerges if
-the film first shows it nearer than 45 m, 5 m within the range. The line has a reason (an object
-covers 5 m in a keyframe), it is older than this score, and recordings have it too, since a box
-says when it first holds a point.
+Emerging and entering are defined in `care_sim.evaluation.strata`. An object emerges if the film
+first shows it nearer than 45 m, 5 m within the range. An object covers 5 m in a keyframe. The line
+is older than this score, and also exists in recordings, where a box first holds a point.
 
-In a drive or a test they are the collision `avoided`, and the `needless stops`.
+Counts in a drive or a test: the collision `avoided`, and the `needless stops`.
 
-A detector that detects by chance makes draws, and draws are noise that no policy can help. For
-newcomers the row of such a detector also has the sum of the chances
-(`care_sim.evaluation.chances`), and this sum is the count. Kept objects count by draws: luck lasts
-and tracks follow it, so that a sum of chances would be too high.
+A detector that detects by chance adds noise that no policy can influence. So newcomers are counted
+by the sum of their chances, which the row of such a detector has (`care_sim.evaluation.chances`).
+Kept objects are counted by draws. Luck lasts and tracks follow it, so a sum of chances would be too
+high.
 """
 
 from collections.abc import Mapping
@@ -42,7 +41,7 @@ _EXPECTED = "expected"
 def expected_columns(sightings: Sightings, chances: Floats) -> dict[str, float]:
     """Return the expected counts of newcomers as columns `expected/COUNT` of a row.
 
-    `chances` (e,) are those that `sightings.events` are detected.
+    `chances` (e,) are the detection chances of `sightings.events`.
     """
     return {
         f"{_EXPECTED}/{count}": float(chances[own[sightings.events]].sum())
@@ -61,7 +60,7 @@ def rows_of_newcomers(sightings: Sightings) -> dict[str, Mask]:
 
 def scene_counts(row: Mapping[str, Any]) -> dict[str, float]:
     """Return the counts of a row of the open loop: expected newcomers where the row has them."""
-    # A file that holds plays of several detectors has nothing there for some of them.
+    # In a file of several detectors, some rows lack these columns.
     expected = {count: row.get(f"{_EXPECTED}/{count}") for count in SCENE_COUNTS}
     return {
         count: _drawn(row, count) if value is None else value for count, value in expected.items()

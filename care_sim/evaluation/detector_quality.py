@@ -1,9 +1,8 @@
-"""How good the boxes of a detector are: which are right, and which objects they find, from every
-score on.
+"""Quality of a detector's boxes: precision and recall by least score.
 
-A box is right if it serves an object by the rule of the scoring (`care_sim.perception.matching`).
-By that rule detections with scores choose in descending order of them. So those below a score take
-nothing from those above it, and one play tells what every least score would have found.
+A box is right if it is matched to an object by the scoring's rule (`care_sim.perception.matching`).
+Detections choose objects in descending order of score. So boxes below a score take no object from
+those above it, and one play covers every least score.
 """
 
 from collections.abc import Sequence
@@ -18,7 +17,7 @@ from care_sim.evaluation.sightings import RANGE_M, Sightings
 from care_sim.perception.matching import UNSERVED, served_by
 
 UNFOUND = -np.inf
-"""The score of the box of an object that has none."""
+"""Score of an object without a box."""
 TENTHS = 10
 
 
@@ -26,10 +25,10 @@ TENTHS = 10
 class SceneBoxes:
     """The boxes of a detector in a scene.
 
-    Of those within range `scores` (d,), 1 of a detector that has none, their `classes` (d,) and
-    whether they are `right` (d,). Of the object frames within range `found_at` (r,), the score of
-    the box that serves each, or UNFOUND, and their `labels` (r,); `events` (e,) are the rows of
-    these that are first sightings. `scans` is how many keyframes the scene has.
+    Boxes within range: `scores` (d,), 1 for a detector without scores, `classes` (d,), and whether
+    they are `right` (d,). Object frames within range: `found_at` (r,), the score of the matched box
+    or UNFOUND, and `labels` (r,). `events` (e,) are the rows of first sightings. `scans` is the
+    number of keyframes.
     """
 
     scores: Floats
@@ -41,7 +40,7 @@ class SceneBoxes:
     scans: int
 
     def of_class(self, label: int) -> "SceneBoxes":
-        """The boxes and objects of one class alone."""
+        """Return the boxes and objects of one class."""
         own, rows = self.classes == label, self.labels == label
         events = np.zeros(len(rows), bool)
         events[self.events] = True
@@ -58,8 +57,8 @@ class SceneBoxes:
 
 @dataclass(frozen=True)
 class Counts:
-    """Sums of every scene (s,), of boxes from some score on: `boxes` and `right` ones, `frames` of
-    objects and `found` ones, `events` and `sighted` ones.
+    """Sums per scene (s,) of boxes from a least score on. `right` of the `boxes`, `found` of the
+    object `frames`, `sighted` of the `events`.
     """
 
     boxes: Floats
@@ -81,19 +80,19 @@ class Counts:
 
     @property
     def first_recall(self) -> float:
-        """Share of the first sightings that are found at once."""
+        """Share of the first sightings that are detected at once."""
         return _share(self.sighted, self.events)
 
 
 def scene_boxes(sightings: Sightings, reports: Sequence[Detections]) -> SceneBoxes:
-    """What the detections of every keyframe, one after the other, are worth."""
+    """Return the boxes of a scene from the detections of its keyframes, in order."""
     scores, classes, right, found_at = [], [], [], []
     for shown, report in zip(sightings.keyframes, reports, strict=True):
         sure = np.ones(len(report)) if report.scores is None else report.scores
         server = served_by(shown, report)
         serves = np.zeros(len(report), bool)
         serves[server[server != UNSERVED]] = True
-        # One beyond the scored range may be as right as any, but nobody asks for its object.
+        # A box beyond the scored range may be right, but its object is not scored.
         near = planar_ranges(report.boxes) <= RANGE_M
         scores.append(sure[near])
         classes.append(report.classes[near])
@@ -113,7 +112,7 @@ def scene_boxes(sightings: Sightings, reports: Sequence[Detections]) -> SceneBox
 
 
 def counts(scenes: Sequence[SceneBoxes], score: float = 0.0) -> Counts:
-    """The sums of boxes with this score or more."""
+    """Return the sums of boxes with this score or more."""
     rows = [
         (
             np.sum(one.scores >= score),
@@ -129,8 +128,8 @@ def counts(scenes: Sequence[SceneBoxes], score: float = 0.0) -> Counts:
 
 
 def score_of_precision(scenes: Sequence[SceneBoxes], precision: float) -> float | None:
-    """The least score from which on at least this share of all boxes is right; None where there is
-    none.
+    """Return the least score from which on at least this share of all boxes is right; None without
+    one.
     """
     scores, shares = _by_least_score(scenes)
     enough = np.flatnonzero(shares >= precision)
@@ -138,8 +137,8 @@ def score_of_precision(scenes: Sequence[SceneBoxes], precision: float) -> float 
 
 
 def curve(scenes: Sequence[SceneBoxes], points: int = 200) -> Floats:
-    """(n, 3) score, recall and precision from each of up to so many scores on, the highest
-    first.
+    """Return (n, 3) score, recall and precision from each of up to this many least scores, the
+    highest first.
     """
     scores, shares = _by_least_score(scenes)
     rows = np.unique(np.linspace(0, max(len(scores) - 1, 0), min(points, len(scores))).astype(int))
@@ -150,8 +149,8 @@ def curve(scenes: Sequence[SceneBoxes], points: int = 200) -> Floats:
 
 
 def reliability(scenes: Sequence[SceneBoxes]) -> Floats:
-    """(TENTHS, 3) how many boxes have a score within each tenth, their mean score, and the share of
-    them that is right; nan in a tenth without a box.
+    """Return (TENTHS, 3) for each tenth of scores: number of boxes, mean score, share of right
+    boxes; nan without a box.
     """
     scores = np.concatenate([one.scores for one in scenes])
     right = np.concatenate([one.right for one in scenes])
@@ -164,19 +163,19 @@ def reliability(scenes: Sequence[SceneBoxes]) -> Floats:
 
 
 def calibration_error(scenes: Sequence[SceneBoxes]) -> float:
-    """The mean distance, over boxes, of the mean score of a tenth from the share that is right
-    (Guo et al. 2017, Eq. 3).
+    """Return the calibration error: the distance of a tenth's mean score from its share of right
+    boxes, averaged over boxes (Guo et al. 2017, Eq. 3).
     """
     many, sure, hits = reliability(scenes).T
     return _share(np.nan_to_num(many * np.abs(sure - hits)), many)
 
 
 def _by_least_score(scenes: Sequence[SceneBoxes]) -> tuple[Floats, Floats]:
-    """Every score that a box has, descending, and the share of right ones from it on."""
+    """Return every score of a box, descending, and the share of right boxes from it on."""
     scores = np.concatenate([one.scores for one in scenes])
     order = np.argsort(-scores)
     hits = np.cumsum(np.concatenate([one.right for one in scenes])[order])
-    # Of equal scores the last row tells of all.
+    # The last row of equal scores covers all of them.
     last = np.flatnonzero(np.diff(scores[order], append=-np.inf))
     return scores[order][last], hits[last] / (last + 1)
 

@@ -1,4 +1,4 @@
-"""How two policies differ keyframe by keyframe and event by event."""
+"""Differences between two policies, by keyframe and by event."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,8 +20,8 @@ class Adding:
 
 @dataclass(frozen=True)
 class AllocationDifference(Adding):
-    """Sums over keyframes. `differing` of the `keyframes` have allocations that differ,
-    by `cells` in all.
+    """Sums over keyframes. Allocations differ at `differing` of the `keyframes`, by `cells` in
+    all.
     """
 
     keyframes: int = 0
@@ -30,7 +30,7 @@ class AllocationDifference(Adding):
 
     @property
     def share(self) -> float:
-        """Of the keyframes, those at which the allocation differs; nan without a keyframe."""
+        """Share of keyframes with different allocations; nan without a keyframe."""
         return self.differing / self.keyframes if self.keyframes else float("nan")
 
     @property
@@ -42,12 +42,12 @@ class AllocationDifference(Adding):
 
 
 def allocation_difference(ours: Sequence[Cells], theirs: Sequence[Cells]) -> AllocationDifference:
-    """Compare the cells fired at every keyframe: the order of selection does not count, and a cell
-    that is fired n times counts n times.
+    """Compare the cells fired at every keyframe. The order of selection is ignored, and a cell
+    fired n times counts n times.
 
-    Allocations differ by the cells that one fires and the other does not, the larger side where the
-    sizes differ: of two that spend the same budget, the cells that were fired elsewhere. Raises
-    InvalidInput for unequal lengths.
+    Allocations differ by the cells that only one of them fires; of two unequal sides the larger
+    counts. At the same budget this is the number of cells fired elsewhere. Raises InvalidInput for
+    unequal lengths.
     """
     if len(ours) != len(theirs):
         raise InvalidInput(
@@ -59,8 +59,8 @@ def allocation_difference(ours: Sequence[Cells], theirs: Sequence[Cells]) -> All
 
 
 def _moved(ours: Cells, theirs: Cells) -> int:
-    # Of equal sizes both sides have as many cells of their own. Of unequal ones the larger side has
-    # more: what it fired beyond the other counts, too.
+    # With equal sizes both sides have equally many cells of their own. Otherwise the larger side
+    # has more, and its surplus counts too.
     size = max(ours.max(initial=0), theirs.max(initial=0)) + 1
     shared = np.minimum(np.bincount(ours, minlength=size), np.bincount(theirs, minlength=size))
     return max(len(ours), len(theirs)) - int(shared.sum())
@@ -69,7 +69,7 @@ def _moved(ours: Cells, theirs: Cells) -> int:
 @dataclass(frozen=True)
 class DetectionOrder(Adding):
     """Events that the first policy detected earlier, later, or at the same keyframe as the second
-    (paper, Sec. 5.5). Two that never detect it within the censoring time are tied.
+    (paper, Sec. 5.5). If neither detects an event within the censoring time, they tie.
     """
 
     earlier: int = 0

@@ -18,13 +18,12 @@ def outcome(keyframes: Sequence[Keyframe]) -> Outcome:
 
 def outcome_of(records: Records, impact: Impact | None) -> Outcome:
     """The result of an episode with these `records`, (n,) each, which ends with the `impact`."""
-    # The first detection counts from the first keyframe on, in view or not: LiDAR may find what the
-    # camera does not show.
+    # The first detection counts from the first keyframe on, in view or not: LiDAR may detect
+    # objects outside the camera's view.
     found = np.flatnonzero(records.detected)
     first = float(records.distance_m[found[0]]) if len(found) else None
 
-    # What a policy lets come near is counted from when it could have been seen, not while it was
-    # hidden behind something.
+    # Closeness counts from when the object was visible, not while it was hidden.
     is_seen = bool(records.in_view.any())
     since = int(records.in_view.argmax())
     unseen = since if is_seen else len(records.in_view)
@@ -99,11 +98,11 @@ def _encounter(meeting: Meeting, sights: Sequence[Sight], hit: bool) -> Encounte
 
 
 SAME_SPEED_MPS = 1 / 3.6
-"""Within 1 km/h a speed is the same: the tolerance of a test speed in Euro NCAP's protocols."""
+"""Speeds within 1 km/h count as equal, as for test speeds in Euro NCAP's protocols."""
 
 
 class CollisionOutcome(StrEnum):
-    """How it ended."""
+    """The outcome of a test: no collision, a slower one, or an unbraked one."""
 
     AVOIDED = "avoided"
     MITIGATED = "mitigated"
@@ -111,7 +110,7 @@ class CollisionOutcome(StrEnum):
 
 
 def collision_outcome(impact_mps: float | None, unbraked_mps: float) -> CollisionOutcome:
-    """How it ended, from the speed of the impact, None without one, and that at which a car hits
+    """Return the outcome from the impact's speed, None without one, and the impact speed of a car
     that does not brake.
     """
     if impact_mps is None:
@@ -121,13 +120,13 @@ def collision_outcome(impact_mps: float | None, unbraked_mps: float) -> Collisio
 
 
 BEST_SCORE = 5.0
-"""Of a test without a contact."""
+"""Score of a test without a contact."""
 _MOST_OF_A_HIT = 4.0
 
 
 def score(impact: float | None, reference: float) -> float:
-    """5 without an impact, else 4 max(0, 1 - impact / reference), speeds in m/s (Ljungbergh et al.
-    2024, NeuroNCAP).
+    """Return 5 without an impact, else 4 max(0, 1 - impact / reference). Speeds in m/s (Ljungbergh
+    et al. 2024, NeuroNCAP).
     """
     if impact is None:
         return BEST_SCORE

@@ -1,35 +1,34 @@
-"""Where the rays of a keyframe went (paper, Sec. 5.2): which share of the budget hit an object, how
-the camera's wedges meet the reserve, and why an object was missed.
+"""Where the rays of a keyframe went (paper, Sec. 5.2): the share of the budget that hit an object,
+the camera's wedges in the reserve, and the reason of each miss.
 
-Why a policy did not detect an object at its first keyframe, for every miss exactly one reason.
+Each miss of an object at its first keyframe has exactly one reason.
 
-Two questions decide. Did the policy ask for enough of the cells in which a full scan finds the
-object? Where it did, the budget ended first, or the rays came back with too little. Where it did
-not: what had the camera shown of the object?
+Two questions decide. Did the policy demand enough of the cells in which a full scan detects the
+object? If so, the budget ended first, or the rays returned too little. If not: what had the camera
+shown of the object?
 
-Too few of its cells were asked for:
+The policy demanded too few cells of the object:
 
-- `not in picture`: no image box of it had reached the policy. It was outside the pictures, the
-  detector missed it, or it was too small or too late.
-- `explained`: it had image boxes, but forecasts explain them all, and no wedge of them was asked
-  for.
-- `not demanded`: an image box of it is unexplained, and its wedge was not asked for. The policy has
+- `not in picture`: no image box of it had reached the policy. It was outside the pictures, missed
+  by the detector, too small or too late.
+- `explained`: it had image boxes, but forecasts explain them all, and no wedge of them was
+  demanded.
+- `not demanded`: an image box of it is unexplained, and its wedge was not demanded. The policy has
   no camera, or takes another part of it.
 
-Enough of them were asked for, and the budget ended before enough were fired. What decides is the
-set that owes most of them:
+The policy demanded enough cells, and the budget ended before enough were fired. The set that owes
+most of them decides:
 
 - `starved`: it got fewer cells than a detection needs.
-- `elsewhere`: it got as many or more, but not these: for example the margin by which it is dilated,
-  or the first part of a pattern.
+- `elsewhere`: it got as many or more, but other ones: for example the margin by which it is
+  dilated, or the first part of a pattern.
 
-Nothing more could be asked for:
+The policy could not demand more:
 
-- `too few returns`: rays enough hit it; or the wedge of an image box was asked for and lies beside
+- `too few returns`: enough rays hit it; or the wedge of an image box was demanded and lies beside
   it; or a full scan has too few returns on it.
 
-Of a policy that never asks the camera, the first three reasons tell what the camera would have
-shown it.
+For a policy without a camera, the first three reasons describe what the camera would have shown.
 """
 
 from collections.abc import Sequence
@@ -46,16 +45,17 @@ from care_sim.core.types import Demand
 from care_sim.evaluation.differences import Adding
 
 RAY_SHARES = ("exploitation", "layer_1", "layer_2", "later_layers", "floor")
-"""The shares that are told apart. Of CARE layer 1 is U, of care-sbf layers 1 and 2 are U and M; a
-policy with a layer for every shell of distance has dozens, of which the later ones are one."""
+"""The shares that are counted. For CARE layer 1 is U; for care-sbf layers 1 and 2 are U and M. A
+policy with a layer for every shell of distance has dozens; the later ones share one entry.
+"""
 _LAST_OWN, _LATER, _FLOOR = 2, 3, 4
-"""Places in RAY_SHARES: up to the first, a stage has a share of its own."""
+"""Places in RAY_SHARES. Stages up to the first have their own share."""
 
 
 @dataclass(frozen=True)
 class ServedDemand:
-    """What a policy asked for at a keyframe and what it got: all cells `fired` (n,), and those that
-    fired for every stage of the demand (`took`), exploitation first. The others are the floor's.
+    """A policy's demand at a keyframe and its allocation: all cells `fired` (n,), and those fired
+    for every stage of the demand (`took`), exploitation first. The floor fired the others.
     """
 
     demand: Demand
@@ -64,8 +64,8 @@ class ServedDemand:
 
     @classmethod
     def of(cls, demand: Demand, fired: Cells, rig: Rig) -> "ServedDemand":
-        """Of a demand whose allocation, and floor, are the cells `fired`. A cell that fires along
-        with others of its unit belongs to the stage of the first of them that was asked for.
+        """Return the record of a demand whose allocation, floor included, is `fired`. Cells that
+        fire together as a unit belong to the stage of the unit's first demanded cell.
         """
         stages = taken_by_stage(demand, rig.budget, rig.reserve_fraction)
         places = rig.hardware.credited(np.concatenate(stages), fired)
@@ -80,15 +80,15 @@ class ServedDemand:
 
     @property
     def sets(self) -> list[Cells]:
-        """All sets that were asked for, in order of stage and set."""
+        """Return all demanded sets, in order of stage and set."""
         return [*chain(*stages_of(self.demand))]
 
 
 def rays_by_share(returns: Cells, served: ServedDemand) -> Integers:
-    """(5,) how many rays of each of `RAY_SHARES` hit an object.
+    """Return (5,) the number of rays of each of `RAY_SHARES` that hit an object.
 
-    `returns` (P,) are the cells of all returns that a full scan has on it: a cell with two returns
-    counts twice, for it gives the detector two.
+    `returns` (P,) are the cells of all returns that a full scan has on it. A cell with two returns
+    counts twice, since the detector gets two.
     """
     counts = np.zeros(len(RAY_SHARES), np.int64)
     for stage, cells in enumerate(served.took):
@@ -98,8 +98,8 @@ def rays_by_share(returns: Cells, served: ServedDemand) -> Integers:
 
 
 def shares_of_credit(rays: Integers) -> Floats:
-    """(e, 5) the part that each share has in every one of e sightings, by the rays (e, 5) that hit
-    it: every sighting counts 1, and one that no ray hit counts nothing.
+    """Return (e, 5) the credit of each share for each of e sightings, in proportion to the rays (e,
+    5) that hit it. A sighting has a total credit of 1, or 0 without rays.
     """
     totals = rays.sum(axis=1, keepdims=True)
     parts: Floats = np.divide(rays, totals, out=np.zeros(rays.shape), where=totals > 0)
@@ -112,14 +112,14 @@ def _hits(returns: Cells, cells: Cells) -> int:
 
 @dataclass(frozen=True)
 class ReserveUse(Adding):
-    """How the camera's wedges meet the reserve (paper, Sec. 5.2, "The near-tie is mechanical"), as
-    sums over keyframes.
+    """Use of the reserve by the camera's wedges, as sums over keyframes (paper, Sec. 5.2, "The
+    near-tie is mechanical").
 
-    At `filled` of the `keyframes` the unexplained wedges U alone take all that exploitation leaves
-    of the budget, so that nothing is left to the explained wedges M or to the floor; at
-    `filled_rho` they take the reserve's own rho B at least. `explained_cells` are the cells of M
-    outside U, which the residual filter removes, and `untaken_cells` those of them that
-    exploitation had not taken.
+    At `filled` of the `keyframes` the unexplained wedges U take the whole rest of the budget after
+    exploitation. Nothing is then left to the explained wedges M or to the floor. At `filled_rho`
+    keyframes U takes at least the reserve's own rho B. `explained_cells` are the cells of M outside
+    U, which the residual filter removes. `untaken_cells` are those of them that exploitation had
+    not taken.
     """
 
     keyframes: int = 0
@@ -136,7 +136,9 @@ def reserve_use(
     budget: int,
     reserve_fraction: float,
 ) -> ReserveUse:
-    """Of one keyframe: exploitation takes `hulls`, U is `unexplained` and M is `by_memory`."""
+    """Return the sums of one keyframe: exploitation takes `hulls`, U is `unexplained` and M is
+    `by_memory`.
+    """
     exploited, taken = taken_by_stage(Demand(hulls, [unexplained]), budget, reserve_fraction)
     removed = np.setdiff1d(_union(by_memory), _union(unexplained))
     return ReserveUse(
@@ -166,11 +168,11 @@ NOT_IN_PICTURE, EXPLAINED, NOT_DEMANDED, STARVED, ELSEWHERE, TOO_FEW_RETURNS = M
 
 @dataclass(frozen=True)
 class Appearance:
-    """An object at its first keyframe. Truth: for the scoring alone.
+    """An object at its first keyframe. This is truth, for the scoring only.
 
-    `returns` (P,) are the cells of the returns that a full scan has on it, `wedges` those of the b
-    image boxes of it that reached the policy, `explained` (b,) whether a forecast explains each.
-    `tracked` says whether a track is on it already: it was detected beyond the scored range.
+    `returns` (P,) are the cells of a full scan's returns on it. `wedges` are the cells of its b
+    image boxes that reached the policy; `explained` (b,) marks boxes that a forecast explains.
+    `tracked` is True if it already has a track, from beyond the scored range.
     """
 
     returns: Cells
@@ -180,15 +182,15 @@ class Appearance:
 
     @property
     def falsely_explained(self) -> bool:
-        """Whether forecasts of other objects alone explain it: it has an image box, all of them are
-        explained, and no track is on it.
+        """Return True if only forecasts of other objects explain it: it has image boxes, all are
+        explained, and it has no track.
         """
         return bool(self.wedges) and bool(self.explained.all()) and not self.tracked
 
 
 def miss_reason(seen: Appearance, served: ServedDemand, min_returns: int) -> str:
-    """One of `MISS_REASONS` for an object that was not detected; a detection needs `min_returns`
-    returns, at least.
+    """Return the `MISS_REASONS` entry of an undetected object; a detection needs at least
+    `min_returns` returns.
     """
     hit = np.isin(seen.returns, served.fired)
     if hit.sum() >= min_returns or len(seen.returns) < min_returns:
@@ -198,16 +200,16 @@ def miss_reason(seen: Appearance, served: ServedDemand, min_returns: int) -> str
         return _of_budget(seen.returns[~hit], served, min_returns)
     if not seen.wedges:
         return NOT_IN_PICTURE
-    # A wedge that was asked for lies beside the object: its cells would be among those asked for.
+    # A demanded wedge lies beside the object: otherwise the object's cells would be demanded.
     if any(np.isin(wedge, asked).all() for wedge in seen.wedges):
         return TOO_FEW_RETURNS
     return EXPLAINED if seen.explained.all() else NOT_DEMANDED
 
 
 def _of_budget(owed: Cells, served: ServedDemand, min_returns: int) -> str:
-    """Which of the two where the budget ended before cells `owed` (n,) were fired."""
-    # Every set that still owes a cell was cut off. The one that owes most of them, the first of
-    # equals, is the one that would have found the object.
+    """Return the reason if the budget ended before the cells `owed` (n,) were fired."""
+    # Every set that still owes a cell was cut off. The set that owes most, the first of equals,
+    # would have detected the object.
     debts = [int(np.isin(owed, cells).sum()) for cells in served.sets]
     debtor = served.sets[int(np.argmax(debts))]
     return STARVED if np.isin(debtor, served.fired).sum() < min_returns else ELSEWHERE

@@ -1,14 +1,15 @@
 """First-sighting recall, overall recall and time to first detection, as numerators and denominators
 of a scene.
 
-Time to first detection (TTFD) of an event is the number of keyframes from its first sighting to the
-first keyframe at which the object is found: 0 where it is found at once, and K where it is not
-found at the first sighting or at the K - 1 keyframes that follow it. Every event counts, also one
-nearer than K to the end of the scene or whose object leaves before: not found, it counts K. The
-paper names one censoring time, K = 6 keyframes, for all events (Remark 1), and a mean over the
-events that recall is taken over; a shorter time would make a miss cheaper where the scene happens
-to end or the object drives off. `SceneScore.chances` says at how many of the K keyframes the object
-was in range, for whoever wants only the events that had them all.
+The time to first detection (TTFD) of an event is the number of keyframes from its first sighting to
+the first keyframe at which the object is detected. It is 0 for a detection at once, and K without
+one at the first sighting or the K - 1 keyframes after it.
+
+Every event counts, also an object that leaves, or a scene that ends, before K keyframes:
+undetected, it counts K. The paper names one censoring time, K = 6 keyframes, for all events (Remark
+1), and takes the mean over the events of recall. A shorter time would make such misses cheaper.
+`SceneScore.chances` is the number of the K keyframes at which the object was in range, to select
+events that had them all.
 """
 
 from collections.abc import Sequence
@@ -28,11 +29,11 @@ CENSORED_AT = 6
 
 @dataclass(frozen=True)
 class Tally(Adding):
-    """Sums over a scene, or over several.
+    """Sums over one or more scenes.
 
-    `events`, of which `sighted` were found at their first keyframe; `delay` is the sum of their
-    TTFD in keyframes. `frames` are the object frames in range, of which `found` were found. An
-    average over floor seeds is no whole number.
+    `sighted` of the `events` were detected at their first keyframe; `delay` is the sum of their
+    TTFD in keyframes. `found` of the object `frames` in range were detected. An average over floor
+    seeds need not be whole.
     """
 
     events: float = 0.0
@@ -44,9 +45,9 @@ class Tally(Adding):
 
 @dataclass(frozen=True)
 class SceneOutcome:
-    """How a play of a scene ended: `first_sightings` events and `object_frames` in range, the
-    shares of them that were found, at the first sighting and at all, 0 to 1, and `ttfd_keyframes`,
-    the mean time to first detection of the events. None where there is nothing to find.
+    """The result of a play of a scene. `first_sightings` events and `object_frames` in range, the
+    share of each that was detected, 0 to 1, and `ttfd_keyframes`, the mean TTFD of the events. None
+    without objects to detect.
     """
 
     first_sightings: int
@@ -58,10 +59,10 @@ class SceneOutcome:
 
 @dataclass(frozen=True)
 class SceneScore:
-    """What a policy found of a scene.
+    """A policy's detections in a scene.
 
-    `found` (r,) by row of `sightings.frames`; of the events (e,) `delays` are the TTFD in
-    keyframes, `CENSORED_AT` where not found, and `chances` the keyframes among the first
+    `found` (r,) marks rows of `sightings.frames`. `delays` (e,) are the TTFD of events in
+    keyframes, `CENSORED_AT` without detection. `chances` (e,) count the keyframes among the first
     `CENSORED_AT` at which the object was in range.
     """
 
@@ -72,9 +73,9 @@ class SceneScore:
 
     @classmethod
     def of(cls, sightings: Sightings, masks: Sequence[Mask]) -> "SceneScore":
-        """The score of a scene whose keyframes were matched one by one.
+        """Return the score of a scene from the matches of its keyframes.
 
-        `masks` are one per keyframe: (n,) which of its annotations, of all ranges, were found
+        `masks` are one per keyframe: (n,) which of its annotations, of all ranges, were detected
         (`matching.found_objects`).
         """
         # Rows of the table are the scored annotations, keyframe after keyframe, as the masks are.
@@ -87,13 +88,14 @@ class SceneScore:
         late = rows.keyframes - events.keyframes[:, None]
         ages = np.where(rows.objects == events.objects[:, None], late, CENSORED_AT)
 
-        # An event is found first at the youngest of its object's rows that was found. Found at none
-        # that is younger than K, it keeps K, the initial value.
+        # An event's delay is the age of the earliest detected row of its object. Without one
+        # younger than K, the delay keeps its initial value K.
         delays = np.where(found, ages, CENSORED_AT).min(axis=1, initial=CENSORED_AT)
         return cls(sightings, found, delays, np.sum(ages < CENSORED_AT, axis=1))
 
     def tally(self, within: Mask | None = None) -> Tally:
-        """The sums, of all or of the rows (r,) of `sightings.frames` that lie `within` a stratum.
+        """Return the sums of all rows, or of the rows (r,) of `sightings.frames` `within` a
+        stratum.
 
         An event belongs to the stratum of its first sighting, wherever the object is when it is
         found.

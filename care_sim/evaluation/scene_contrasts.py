@@ -1,9 +1,8 @@
-"""Two policies on the same scenes: how much more one found, or which share of what the other did,
-and how sure that is (paper, Sec. 3, Sec. 5.2 and Table 1).
+"""Two policies on the same scenes: difference or ratio of their detections, with intervals (paper,
+Sec. 3, Sec. 5.2 and Table 1).
 
-Policies are paired by scene and whole scenes are resampled, for the events of a scene are not
-independent. Scenes without an event, or without an object frame, hold nothing of the measure and
-are left out of it.
+Policies are paired by scene and whole scenes are resampled, since the events of a scene are not
+independent. A measure leaves out scenes without an event, or without an object frame.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -49,7 +48,7 @@ TTFD = Ratio("censored TTFD", "keyframes", 1.0, lambda t: t.delay, lambda t: t.e
 
 @dataclass(frozen=True)
 class RatioLevel:
-    """A measure of one policy: over all events alike, and with equal weight to every scene; None
+    """A measure of one policy, with equal weight per event and with equal weight per scene; None
     without any.
     """
 
@@ -59,10 +58,10 @@ class RatioLevel:
 
 @dataclass(frozen=True)
 class SceneContrast:
-    """One policy less another in the unit of `ratio`, over `scenes` with `weight` events (or object
-    frames) in all.
+    """One policy minus another in the unit of `ratio`, over `scenes` with `weight` events (or
+    object frames) in all.
 
-    `by_event`: every event weighs alike; `by_scene`: every scene does.
+    `by_event` has equal weight per event, `by_scene` per scene.
     """
 
     ratio: Ratio
@@ -73,14 +72,16 @@ class SceneContrast:
 
     @property
     def excludes_zero(self) -> bool:
-        """Whether the interval of the events excludes zero; never of fewer than 5 scenes."""
+        """Return True if the interval of the events excludes zero; False for fewer than 5
+        scenes.
+        """
         return self.scenes >= FEWEST_PAIRS and (self.by_event.low > 0 or self.by_event.high < 0)
 
 
 @dataclass(frozen=True)
 class SceneShare:
-    """What one policy found in % of what another found; in so many `scenes` the other found
-    anything.
+    """One policy's detections in % of another's. `scenes` counts the scenes in which the other
+    detected anything.
     """
 
     interval: Interval
@@ -92,8 +93,8 @@ def averaged(seeds: Sequence[Tallies]) -> dict[str, Tally]:
 
     Raises InvalidInput where the seeds do not count the same events and object frames of a scene.
     """
-    # The mean comes before the pairing: floor seeds of a scene are no scenes of their own, and as
-    # samples they would make an interval look surer than it is.
+    # The mean comes before the pairing: floor seeds of a scene are not separate scenes, and as
+    # samples they would make the interval too narrow.
     scenes = sorted(set.intersection(*(set(seed) for seed in seeds))) if seeds else []
     return {scene: _mean(scene, [seed[scene] for seed in seeds]) for scene in scenes}
 
@@ -113,7 +114,8 @@ def ratio_level(ratio: Ratio, tallies: Tallies) -> RatioLevel:
 
 
 def scene_contrast(ratio: Ratio, ours: Tallies, theirs: Tallies) -> SceneContrast | None:
-    """`ours` less `theirs` on the scenes that both have; None where nothing is to be found in them.
+    """Return `ours` minus `theirs` on the scenes that both have; None if they hold nothing to
+    detect.
 
     Raises InvalidInput where the two do not count the same events or object frames of a scene.
     """
@@ -129,14 +131,15 @@ def scene_contrast(ratio: Ratio, ours: Tallies, theirs: Tallies) -> SceneContras
 
 
 def scene_share(ratio: Ratio, ours: Tallies, whole: Tallies) -> SceneShare | None:
-    """`ours` in % of the `whole` on the scenes that both have; None where the whole found nothing.
+    """Return `ours` in % of the `whole` on the scenes that both have; None if the whole detected
+    nothing.
 
-    It is a quotient of two recalls of the same objects. What ours found need not be among what the
-    whole did, so that it can exceed 100. Raises InvalidInput as `scene_contrast` does.
+    The share is a quotient of two recalls of the same objects. Ours may detect other objects than
+    the whole, so the share can exceed 100. Raises InvalidInput as `scene_contrast` does.
     """
     a, b, _ = _columns(ratio, _pairs(ratio, ours, whole))
-    # What ours found where the whole found nothing counts too: both recalls are of all scenes. But
-    # how sure the share is depends on the scenes that make its denominator.
+    # Our detections count also where the whole has none: both recalls are of all scenes. The
+    # interval depends only on the scenes in the denominator.
     rich = int(np.count_nonzero(b))
     if not rich:
         return None
@@ -151,11 +154,11 @@ def contrast_gap(
     first: Collection[str],
     second: Collection[str],
 ) -> Interval | None:
-    """How much larger the contrast is in the `first` scenes (the dense third) than in the `second`,
-    events alike.
+    """Return how much larger the contrast is in the `first` scenes (the dense third) than in the
+    `second`, with equal weight per event.
 
-    None where either has fewer than two scenes with something to find. Raises InvalidInput for
-    groups that share a scene.
+    Returns None if either group has fewer than two scenes with something to detect. Raises
+    InvalidInput for groups that share a scene.
     """
     if shared := sorted(set(first) & set(second)):
         raise InvalidInput(
@@ -174,7 +177,7 @@ def contrast_gap(
 
 
 def _pairs(ratio: Ratio, ours: Tallies, theirs: Tallies) -> list[tuple[Tally, Tally]]:
-    """The tallies of shared scenes in which there is something to find."""
+    """Return the tallies of shared scenes with something to detect."""
     # In order of name: the resampling draws rows, so their order is a part of its result.
     pairs = [(scene, ours[scene], theirs[scene]) for scene in sorted(set(ours) & set(theirs))]
     for scene, a, b in pairs:

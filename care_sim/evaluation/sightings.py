@@ -2,28 +2,30 @@
 no policy.
 
 "A first sighting is the first keyframe at which an annotated object within range R appears in the
-scene, excluding objects present at scene start." Only objects within range are in the scene that is
-scored, so this one sentence settles every case:
+scene, excluding objects present at scene start." Only objects within range are in the scored scene,
+so this sentence covers every case:
 
-- not annotated at the first keyframe, and later scored within range (it drove in round a corner):
-  an event where it is first scored, that is where a return or a pixel first shows it;
-- annotated from the start or later, but beyond R, and then nearer (it enters by range): an event
-  where it is first scored within R, a "new entry" like any other;
-- within R at the first keyframe: "present at scene start", never an event, whatever it does later;
-- gone and back, out of range or out of the annotations: "reappearances after annotation gaps are
-  not scored separately", so an object has one event at most;
+- not annotated at the first keyframe, and later scored within range: an event where it is first
+  scored, by its first return or pixel;
+- annotated beyond R and then nearer (it enters by range): an event where it is first scored within
+  R, a "new entry" like any other;
+- within R at the first keyframe: "present at scene start", never an event;
+- gone and back (range or annotations): "reappearances after annotation gaps are not scored
+  separately", so an object has at most one event;
 - never within R: no event.
 
-The sentence does not ask who could be seen. So an object that its source annotates within R at
-the first keyframe is present there though neither a return nor a pixel shows it
-(`care_sim.loops.film.Film.hidden`), and is no event when it shows itself: `presence="annotated"`,
-the rule. That takes out the very case after which the closed loop is made: the person who stands
-behind a parked van from the first keyframe on and then walks out. How much it takes out depends on
-who annotates. People drew the boxes of recordings, and seldom drew one where they saw nothing; the
-generator of a street knows everybody, also those whom nobody could have annotated.
-`presence="visible"` counts as present only what a sensor shows at the first keyframe, so that
-the one behind the van is an event; `Sightings.emerging` are those by which the two counts differ.
-What is scored at a keyframe is the same in both.
+The sentence ignores visibility. By the default, `presence="annotated"`, an object annotated within
+R at the first keyframe is present there, even without a return or a pixel
+(`care_sim.loops.film.Film.hidden`). It is no event when it appears.
+
+This rule removes the closed loop's main case: a person who stands behind a parked van from the
+first keyframe on and then walks out. Its effect depends on the annotator. People who annotated
+recordings seldom drew a box where they saw nothing. The generator of a street annotates everybody,
+also invisible objects.
+
+With `presence="visible"` only objects that a sensor shows at the first keyframe are present, so the
+person behind the van is an event. `Sightings.emerging` are the events by which the two counts
+differ. Both rules score the same objects at a keyframe.
 """
 
 from collections.abc import Sequence
@@ -40,16 +42,15 @@ RANGE_M = 50.0
 1).
 """
 ANNOTATED, VISIBLE = PRESENCES = ("annotated", "visible")
-"""Who is present at scene start: all that is annotated there, or what shows a return or a pixel."""
+"""Objects present at scene start: all annotated ones, or those with a return or a pixel."""
 
 
 @dataclass(frozen=True)
 class ObjectFrames:
-    """Every annotated object at every keyframe at which it is in range, in order of keyframe, as
-    columns of one table.
+    """Annotated objects in range, a row per object and keyframe, in order of keyframe.
 
-    `keyframes` (r,) from 0, `objects` (r,) numbers of the film, `classes` (r,) into
-    `care_sim.core.types.CLASSES`, `ranges` (r,) planar metres and `azimuths` (r,) radians from
+    `keyframes` (r,) count from 0, `objects` (r,) are numbers of the film, `classes` (r,) index
+    `care_sim.core.types.CLASSES`. `ranges` (r,) are planar metres, `azimuths` (r,) radians from
     straight ahead towards the left, in the sensor frame.
     """
 
@@ -63,21 +64,21 @@ class ObjectFrames:
         return len(self.keyframes)
 
     def take(self, rows: Integers | Mask) -> "ObjectFrames":
-        """Some of the rows, by index or mask."""
+        """Return the rows chosen by index or mask."""
         return ObjectFrames(*(getattr(self, column.name)[rows] for column in fields(self)))
 
 
 @dataclass(frozen=True)
 class Sightings:
-    """What there is to find in a scene, the same for every policy.
+    """Everything to detect in a scene, the same for every policy.
 
-    `keyframes` are the annotations it was made from and `in_range` (n,) marks which of their
-    objects, one keyframe after the other, are scored, those within `RANGE_M`: these are the
-    rows of `frames`. `first_ranges` (r,) are the planar metres at which the annotations first show
-    the object of each row, within range or beyond. `events` (e,) are the rows of `frames` that are
-    first sightings, ascending. `emerging` (m,) are the rows at which an object that was hidden
-    within range at the first keyframe first shows itself, ascending: events by the presence
-    "visible", none by "annotated".
+    `keyframes` are its annotations. `in_range` (n,) marks the scored objects of all keyframes in
+    order, those within `RANGE_M`: the rows of `frames`. `first_ranges` (r,) are the planar metres
+    at which the annotations first show each row's object, within range or beyond. `events` (e,) are
+    the rows of first sightings, ascending.
+
+    `emerging` (m,), ascending, are the rows at which an object appears that was hidden within range
+    at the first keyframe. They are events by the presence "visible", not by "annotated".
     """
 
     scene: str
@@ -96,8 +97,8 @@ class Sightings:
         hidden: Annotations = NO_ANNOTATIONS,
         presence: str = ANNOTATED,
     ) -> "Sightings":
-        """The sightings of the scene's annotations, one entry per keyframe; `hidden` are those of
-        `Film.hidden`.
+        """Return the sightings of a scene's annotations, one entry per keyframe; `hidden` are those
+        of `Film.hidden`.
 
         Raises InvalidInput for a scene without a keyframe, for an object annotated twice at one
         keyframe or without a finite centre, and for a presence that is none of `PRESENCES`.
@@ -114,8 +115,8 @@ class Sightings:
         for table in (rows, start):
             _check(scene, table)
 
-        # What is beyond the range is in no scene that is scored, so it counts neither as present
-        # nor as appearing there.
+        # Objects beyond the range are not in the scored scene, so they are neither present nor
+        # appear there.
         in_range = rows.ranges <= RANGE_M
         frames = rows.take(in_range)
         # Rows are in order of keyframe, so the first row of an object is its first keyframe.

@@ -1,18 +1,18 @@
-"""B90: the smallest budget at which a policy has 90% of what a full scan has, on every count.
+"""B90: the smallest budget at which a policy reaches 90% of a full scan, on every count.
 
-An entry plays the same worlds at each of `BUDGETS`. The share of a count is its sum over the worlds
-by the full scan's sum: every object weighs alike. A share of 90% is enough; of needless stops, at
-most 5 in 100 worlds more than the full scan's are enough. Between two budgets shares are linear in
-the logarithm of the budget.
+An entry plays the same worlds at each of `BUDGETS`. The share of a count is its sum over the
+worlds, divided by the full scan's sum: every object has the same weight. A share of 90% is enough.
+Of needless stops, up to 5 in 100 worlds more than the full scan's are allowed. Between two budgets
+shares are linear in the logarithm of the budget.
 
-More cells should never be worse. A curve that falls below 90% again is one that cannot be relied on
-above its first crossing, so that the **last** crossing counts: from B90 on every count stays at 90%
-or above, at every budget that was played. B90 is `BUDGETS[0]` where that holds from the smallest
-budget on ("at most"), and infinite where it does not hold at the largest one ("never").
+More cells should never be worse. A curve that falls below 90% again is unreliable above its first
+crossing, so the **last** crossing counts. From B90 on every count stays at 90% or above, at every
+budget played. B90 is `BUDGETS[0]` if that holds from the smallest budget on ("at most"), and
+infinite if it fails at the largest one ("never").
 
-Intervals are over worlds: 10,000 times as many worlds are drawn with replacement, part by part. All
-entries of the same worlds meet the same draws, so that a ratio of two entries is paired. Draws of a
-part with fewer than `LEAST_WORLDS` say little: tables then print no interval (`has_interval`).
+Intervals are over worlds: the worlds of each part are drawn with replacement 10,000 times. All
+entries of the same worlds use the same draws, so that a ratio of two entries is paired. Draws of a
+part with fewer than `LEAST_WORLDS` are unreliable: tables then print no interval (`has_interval`).
 """
 
 from collections.abc import Sequence
@@ -30,19 +30,19 @@ from care_sim.evaluation.counts import NEEDLESS
 BUDGETS = (0.005, 0.01, 0.02, 0.03, 0.05, 0.10, 0.20)
 """Shares of all cells, ascending."""
 ENOUGH = 0.90
-"""The share of a full scan's count that is enough."""
+"""Share of a full scan's count that is enough."""
 MORE_STOPS = 0.05
 """Needless stops per world that an entry may have more than the full scan."""
 LEAST_WORLDS = 5
 """Worlds of a part from which on an interval is printed."""
 _ROUNDING = 1e-9
-"""What rounding may take off a share of exactly 90%."""
+"""Allowance for rounding of a share of exactly 90%."""
 
 
 @dataclass(frozen=True)
 class PartCounts:
-    """The counts (k) of one part's worlds (w): by an entry at every budget, `got` (w, b, k), and by
-    the full scan, `full` (w, k).
+    """Counts (k) of one part's worlds (w): an entry's at every budget, `got` (w, b, k), and the
+    full scan's, `full` (w, k).
 
     Raises InvalidInput for shapes that do not fit, for no world, and for numbers that are not
     finite or below 0.
@@ -84,7 +84,7 @@ def names_of(counts: Counts) -> tuple[str, ...]:
 
 
 def has_interval(counts: Counts) -> bool:
-    """Whether every part has worlds enough for an interval over worlds."""
+    """Return True if every part has enough worlds for an interval."""
     return all(len(part.full) >= LEAST_WORLDS for part in counts)
 
 
@@ -105,8 +105,8 @@ def reaching(counts: Counts) -> Floats:
 
 
 def smallest_budget(counts: Counts, draws: Floats | None = None) -> SmallestBudget:
-    """Return B90 of an entry; `draws` are its `resampled_budgets`, where they are at hand. A count
-    of which the full scan has none needs no cell.
+    """Return B90 of an entry; `draws` are its `resampled_budgets`, if known. A count that is 0 for
+    the full scan needs no cell.
     """
     each = reaching(counts)
     low, high = _interval(resampled_budgets(counts) if draws is None else draws)
@@ -116,9 +116,9 @@ def smallest_budget(counts: Counts, draws: Floats | None = None) -> SmallestBudg
 def budget_ratio(ours: Counts, theirs: Counts) -> tuple[float, float, float]:
     """Return the paired ratio of two entries' B90 in the same worlds, with its interval.
 
-    Where both never get there they are tied, and the ratio is 1. A budget of at most `BUDGETS[0]`
-    counts as that. Each share is of the entry's own full scan, since another machine may round
-    the last bit of one. Raises InvalidInput for other parts or numbers of worlds.
+    If both never reach 90% they tie, with a ratio of 1. Smaller budgets count as `BUDGETS[0]`.
+    Shares use the entry's own full scan, since another machine may round its last bit differently.
+    Raises InvalidInput for other parts or numbers of worlds.
     """
     sizes = [[(part.names, len(part.full)) for part in counts] for counts in (ours, theirs)]
     if sizes[0] != sizes[1]:

@@ -1,14 +1,14 @@
 """Strata of events and object frames (paper, Sec. 3), and thirds of scenes (Sec. 5.2).
 
 The paper stratifies by range and azimuth. Class and `entry` are ours. `entry` is how an object came
-within the range R that is scored, told by where the film first shows it. On a street that is where
-a return or a camera pixel first does, in a recording where its box first holds a point, or without
-points where it is first labelled:
+within the scored range R, by the place where the film first shows it. On a street that is its first
+return or camera pixel. In a recording its box first holds a point there, or without points is first
+labelled.
 
-- `emergence`: nearer than R less `RING_WIDTH_M`, presumably out from behind a body;
+- `emergence`: nearer than R minus `RING_WIDTH_M`, presumably from behind a body;
 - `ring`: from there to R, presumably over the edge of the range;
 - `beyond`: farther off than R, so that it was shown before it was scored;
-- `at start`: it is no event, for it was present at scene start (`care_sim.evaluation.sightings`).
+- `at start`: no event, since it was present at scene start (`care_sim.evaluation.sightings`).
 
 Entries are of objects: all object frames of an object lie in the stratum of its entry.
 """
@@ -29,29 +29,30 @@ FRONT, REAR = np.pi / 4, 3 * np.pi / 4
 """Bounds of the sectors, radians off straight ahead to either side: a quarter of the turn ahead,
 one behind and one on each side, whatever the mounting of the cameras."""
 RING_WIDTH_M = 5.0
-"""How far within R the ring begins, in metres: an object that closes at 10 m/s covers 5 m in a
-keyframe of 0.5 s.
+"""Width of the ring within R, metres: an object that closes at 10 m/s covers 5 m in a keyframe of
+0.5 s.
 """
 ENTRY = "entry"
 ENTRIES = EMERGENCE, RING, BEYOND, AT_START = ("emergence", "ring", "beyond", "at start")
-"""The kind of strata by how an object came within range, and its strata; see above."""
+"""The kind of strata by entry, and its strata; see above."""
 EMERGING, ENTERING = "emerging", "entering"
 NEWCOMERS = {EMERGING: (EMERGENCE,), ENTERING: (RING, BEYOND)}
-"""The two kinds of newcomers by their entries: who comes out from behind something near, and who
-merely comes within range. Every table of first sightings shows them apart."""
+"""The two kinds of newcomers by their entries: emerging from behind something near, and entering
+the range. Every table of first sightings shows them apart.
+"""
 SCENE_THIRDS = ("sparse", "middle", "dense")
 
 
 def strata(sightings: Sightings) -> dict[str, dict[str, Mask]]:
-    """By `range`, `azimuth`, `class` and `entry`: the label of every stratum and the rows (r,) of
-    `sightings.frames` that lie in it.
+    """Return, by `range`, `azimuth`, `class` and `entry`, the label of every stratum and its rows
+    (r,) of `sightings.frames`.
 
     The strata of one kind share no row and leave none out. A bound belongs to the farther stratum,
     and to the one farther from straight ahead.
     """
     frames = sightings.frames
-    # Two bounds make three strata; what is neither near nor far is the one between, so that no row
-    # is in two of them or in none.
+    # Two bounds make three strata. Rows neither near nor far are between, so every row is in
+    # exactly one stratum.
     near, far = frames.ranges < NEAR_M, frames.ranges >= FAR_M
     off = np.abs(frames.azimuths)
     front, rear = off < FRONT, off >= REAR
@@ -70,7 +71,7 @@ def strata(sightings: Sightings) -> dict[str, dict[str, Mask]]:
 def _entries(sightings: Sightings) -> dict[str, Mask]:
     frames = sightings.frames
     first = sightings.first_ranges
-    # Who has an event has come in; all others were present at scene start.
+    # Objects with an event have entered; all others were present at scene start.
     came = np.isin(frames.objects, frames.objects[sightings.events])
     beyond = first > RANGE_M
     near = first < RANGE_M - RING_WIDTH_M
@@ -79,10 +80,10 @@ def _entries(sightings: Sightings) -> dict[str, Mask]:
 
 
 def thirds(counts: Mapping[str, float]) -> dict[str, list[str]]:
-    """Scenes ranked by one number per scene (tracked objects, explained detections), cut in three,
-    sparse first.
+    """Rank scenes by one number per scene (tracked objects, explained detections) and cut them in
+    three, sparse first.
 
-    The parts differ by a scene at most; scenes of equal number stand in the order of their names.
+    The parts differ by at most a scene. Scenes of equal number are in the order of their names.
     """
     # The name decides between equal numbers: the thirds must not depend on the order of the scenes.
     ranked = sorted(counts, key=lambda scene: (counts[scene], scene))

@@ -16,7 +16,7 @@ from care_sim.base.digests import declared_files
 from care_sim.base.errors import InvalidInput, MissingExtra, error_line, printable, shown
 from care_sim.base.plugins import Plugins
 from care_sim.perception.cluster.detector import ClusterDetector
-from care_sim.perception.lifetimes import kept_or_made
+from care_sim.perception.lifetimes import get_or_make
 from care_sim.perception.measured.detector import CenterPoint, Megvii, PointRCNN
 from care_sim.perception.measured.tables import MEASURED
 from care_sim.perception.network_detectors import OnnxDetector, TorchScriptDetector
@@ -33,18 +33,18 @@ from care_sim.perception.recorded import RecordedDetector
 PROXY = "returns"
 """The paper's proxy."""
 GRADED = "graded"
-"""The proxy that is surer with more returns."""
+"""The proxy whose recall grows with returns."""
 CLUSTER = "cluster"
-"""The classical one. It is told the grid, and so how far apart neighbouring points are."""
+"""The classical detector. It gets the grid, and so the distance of neighbouring points."""
 PILLARS = "pillars"
 """The learned one."""
 RECORDED = "recorded"
 """The upper bound: what a real detector reported of full scans."""
 PRIVILEGED = (PROXY, GRADED, *MEASURED, RECORDED)
-"""Those that read more than points; all others are `PointDetector`s."""
+"""Detectors that read more than points; all others are `PointDetector`s."""
 
 FED = ("sweeps", "track_score")
-"""Parameters of every `PointDetector`, which say how it is fed."""
+"""Parameters of every `PointDetector` that set its input."""
 
 
 def _faults(made: Any) -> Iterator[str]:
@@ -72,8 +72,8 @@ DETECTORS: Plugins[Any] = Plugins(
 
 
 def detector_names() -> list[str]:
-    """Names that `make_detector` knows: the proxy, the built-in real ones, then those of installed
-    packages.
+    """Return the names for `make_detector`: the proxy, the built-in real ones, then those of
+    installed packages.
     """
     return DETECTORS.names()
 
@@ -84,13 +84,15 @@ def check_detector(name: object) -> None:
 
 
 def make_detector(name: str, sensor_height_m: float, /, **parameters: object) -> Detector:
-    """The detector for a film whose LiDAR is `sensor_height_m` above the road.
+    """Return the detector for a film whose LiDAR is `sensor_height_m` above the road.
 
-    All but the proxies are handed points alone, whoever wrote them; of these the parameters
-    `sweeps` and `track_score` say how they are fed, and equal parameters give the same stateless
-    detector (`care_sim.perception.points_only.PointDetector`). Raises InvalidInput for an
-    unknown name or parameter, or a value that is not allowed; BrokenDetector for one that cannot be
-    loaded or made; MissingExtra for one whose library is not installed.
+    All detectors but the proxies get only points. Their parameters `sweeps` and `track_score` set
+    their input. Equal parameters return the same stateless detector
+    (`care_sim.perception.points_only.PointDetector`).
+
+    Raises InvalidInput for an unknown name or parameter, or a value that is not allowed. Raises
+    BrokenDetector for one that cannot be loaded or made, MissingExtra for one whose library is not
+    installed.
     """
     make = _maker(name)
     fed = {} if name in PRIVILEGED else _fed(make, parameters)
@@ -100,19 +102,23 @@ def make_detector(name: str, sensor_height_m: float, /, **parameters: object) ->
         proxy: Detector = make(**own)
         return proxy
     declared = () if name in DETECTORS.built_in else declared_files(DETECTORS.entry(name))
-    detector = kept_or_made(make, own, partial(_point_detector, name, make, own), declared)
+    detector = get_or_make(make, own, partial(_point_detector, name, make, own), declared)
     again = partial(make_detector, name, sensor_height_m, **parameters)
     return PointsOnly(name, detector, sensor_height_m, **fed, again=again)
 
 
 def sweeps_wanted(name: str, parameters: Mapping[str, object]) -> int:
-    """How many sweeps a detector asks for at a keyframe. Raises as `make_detector` does."""
-    # Nobody detects with it, so any height will do.
+    """Return the number of sweeps that a detector wants at a keyframe. Raises as `make_detector`
+    does.
+    """
+    # This detector never detects, so any height will do.
     return 1 if name in PRIVILEGED else make_detector(name, 1.0, **parameters).gathers
 
 
 def files_read(name: str, parameters: Mapping[str, object]) -> tuple[Path, ...]:
-    """The files that a detector says it reads (`PointDetector`). Raises as `make_detector` does."""
+    """Return the files that a detector declares to read (`PointDetector`). Raises as
+    `make_detector` does.
+    """
     return () if name in PRIVILEGED else make_detector(name, 1.0, **parameters).files
 
 
@@ -122,7 +128,7 @@ def detector_lines() -> list[str]:
 
 
 def _maker(name: str) -> Callable[..., Any]:
-    """What makes the detector. Raises BrokenDetector for one that cannot be loaded."""
+    """Return the maker of a detector. Raises BrokenDetector if it cannot be loaded."""
     check_detector(name)
     try:
         return DETECTORS.maker(name)
@@ -131,7 +137,7 @@ def _maker(name: str) -> Callable[..., Any]:
 
 
 def _fed(make: Callable[..., Any], parameters: dict[str, object]) -> dict[str, Any]:
-    """Those parameters that say how any detector is fed, unless its maker takes them itself."""
+    """Return the parameters of a detector's input, except those that its maker takes itself."""
     try:
         own = inspect.signature(make).parameters
     except (TypeError, ValueError):
@@ -164,7 +170,7 @@ def _check_parameters(
         signature = inspect.signature(make)
     except (TypeError, ValueError) as error:
         raise BrokenDetector(f"detector {name} tells no parameters") from error
-    # A detector that takes any name checks them by itself.
+    # A detector that accepts any name checks names itself.
     accepted = signature.parameters.values()
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in accepted):
         return

@@ -1,5 +1,5 @@
-"""How long a detector lives. A stateless one serves all plays of its process, so a network is
-loaded once. Any other detector is made anew for every play, so no play depends on another.
+"""Lifetimes of detectors. A stateless one serves all plays of its process, so a network is loaded
+once. Any other detector is made anew for every play, so no play depends on another.
 """
 
 import os
@@ -11,15 +11,15 @@ from care_sim.base.digests import file_digest, paths_in
 from care_sim.perception.points_only import PointDetector, files_of, is_stateless
 
 MOST_KEPT = 8
-"""Stateless detectors that a process keeps: the last ones that it asked for."""
+"""Number of stateless detectors that a process keeps, the most recent ones."""
 _KEPT: dict[Hashable, tuple[PointDetector, list[str | None]]] = {}
 """Each with the hashes of the files that it read."""
 _LOCK = RLock()
 
 
 def _forget() -> None:
-    """A session or a device of a parent does not work in a forked child, which opens its own. A
-    thread of the parent that held the lock is not there to release it.
+    """Forget the parent's detectors and lock in a forked child. A parent's session or device does
+    not work there, and a parent's thread that held the lock is gone.
     """
     global _LOCK
     _LOCK = RLock()
@@ -29,20 +29,20 @@ def _forget() -> None:
 os.register_at_fork(after_in_child=_forget)
 
 
-def kept_or_made(
+def get_or_make(
     make: Callable[..., object],
     parameters: Mapping[str, object],
     made: Callable[[], PointDetector],
     declared: Iterable[Path] = (),
 ) -> PointDetector:
-    """Return the stateless detector that `make` made of equal `parameters`, or else what `made`
-    returns, and keep it if it is stateless.
+    """Return the kept stateless detector of equal `parameters`, or a new one, kept if it is
+    stateless.
 
-    A detector is made again after a file has changed that a parameter names, its entry point
-    `declared`, or the detector itself names in `files`.
+    A detector is made again after one of its files has changed: files that a parameter names, that
+    its entry point `declared`, or that the detector lists in `files`.
     """
     key = _key(make, parameters, declared)
-    # Two threads that ask for one network load it once.
+    # Two threads that need one network load it once.
     with _LOCK:
         detector, read = _KEPT.pop(key, (None, []))
         if detector is None or read != _hashes(files_of(detector)):

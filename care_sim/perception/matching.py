@@ -1,6 +1,4 @@
-"""Which annotated objects a detector found: the class-consistent 2 m centre match (paper, Remark
-1).
-"""
+"""Match detections to annotated objects: same class, centres within 2 m (paper, Remark 1)."""
 
 import math
 
@@ -17,27 +15,28 @@ MATCH_M = 2.0
 included.
 """
 UNSERVED = -1
-"""The place of the detection that serves an object which none does."""
+"""Place for an object without a detection."""
 
 
 def found_objects(annotations: Annotations, detections: Detections) -> Mask:
-    """(n,) whether each annotated object has a detection of its class within 2 m, in the plane
-    (`served_by`).
+    """Return (n,) whether each annotated object has a detection of its class within 2 m, in the
+    plane (`served_by`).
     """
     found: Mask = served_by(annotations, detections) != UNSERVED
     return found
 
 
 def served_by(annotations: Annotations, detections: Detections) -> Integers:
-    """(n,) the detection of its class within 2 m, in the plane, that serves each annotated object,
-    or UNSERVED.
+    """Return (n,) the detection matched to each annotated object, or UNSERVED. A match has the same
+    class and is within 2 m in the plane.
 
-    A detection serves one object. Detections without scores are assigned so that they serve the
-    most objects and, among such assignments, with the least sum of distances. Detections with
-    scores choose in descending order of score, each the nearest object still free, which is the
-    rule of the official nuScenes evaluation. Objects of all ranges take part, so that a detection
-    of one beyond the scored range is not counted for a neighbour within it. Raises InvalidInput for
-    detections whose columns do not fit together or are not finite.
+    A detection matches one object. Detections without scores match as many objects as possible,
+    with the least sum of distances. Detections with scores choose in descending order of score,
+    each the nearest free object, as in the official nuScenes evaluation. Objects of all ranges take
+    part, so that a detection of an object beyond the scored range does not count for a neighbour
+    within it.
+
+    Raises InvalidInput for detections whose columns do not fit together or are not finite.
     """
     _check(detections)
     scores = detections.scores
@@ -66,7 +65,7 @@ def _distances(annotations: Annotations, detections: Detections) -> Floats:
 
 
 def _optimal(distances: Floats) -> tuple[Integers, Integers]:
-    """Objects, and the detections that serve them."""
+    """Return matched objects and their detections."""
     from scipy.optimize import linear_sum_assignment
 
     near = np.isfinite(distances)
@@ -87,7 +86,7 @@ def _optimal(distances: Floats) -> tuple[Integers, Integers]:
 def _by_score(
     objects: Floats, classes: Integers, boxes: Floats, reported: Integers, order: Integers
 ) -> Integers:
-    """(n,) the detection that serves each of `objects` (n, 7) of `classes` (n,), or UNSERVED;
+    """Return (n,) the detection matched to each of `objects` (n, 7) of `classes` (n,), or UNSERVED.
     `boxes` (m, 7) of the classes `reported` (m,) choose in this `order` (m,).
     """
     result = np.full(len(objects), UNSERVED)
@@ -98,7 +97,7 @@ def _by_score(
                 x = objects[row, 0] - boxes[detection, 0]
                 y = objects[row, 1] - boxes[detection, 1]
                 away = math.sqrt(x * x + y * y)
-                # It takes the first of equally near ones.
+                # Takes the first of equally near objects.
                 if away < least or (away == least and chosen == UNSERVED):
                     chosen, least = row, away
         if chosen != UNSERVED:

@@ -1,5 +1,5 @@
-"""Detectors that run a network: the conventions of its inputs and outputs, and two that run a file,
-TorchScript or ONNX.
+"""Detectors that run a network: conventions of inputs and outputs, and detectors for TorchScript
+and ONNX files.
 """
 
 import re
@@ -21,8 +21,8 @@ from care_sim.core.types import CLASSES, Detections
 from care_sim.perception.points_only import FIELDS, inside
 
 FORWARD, RIGHT = AXES = "forward", "right"
-"""Where the x axis of a network points: forward, as ours and KITTI's, or right, as that of the raw
-sweeps of nuScenes; y is left of it.
+"""Direction of a network's x axis: forward, as ours and KITTI's, or right, as in nuScenes' raw
+sweeps; y is left of it.
 """
 Names = str | Sequence[str]
 _DRAWING = Lock()
@@ -35,7 +35,8 @@ _ONNX_LOCATION = re.compile(rb"\x0a\x08location\x12([\x01-\x7f])")
 
 
 class NetworkDetector:
-    """The conventions of a network, for a detector around it (`docs/write/your-detector.md`).
+    """Base of a detector around a network, with the network's conventions
+    (`docs/write/your-detector.md`).
 
     - `fields`: the columns that it was trained with, of `care_sim.perception.points_only.FIELDS`.
     - `axes`: `forward` or `right` (`AXES`).
@@ -69,7 +70,7 @@ class NetworkDetector:
         self._labels = np.array([CLASSES.index(n) if n in CLASSES else -1 for n in names])
 
     def points_for(self, points: Floats) -> np.ndarray:
-        """(P, k) float32 points as the network was trained with them."""
+        """Return (P, k) float32 points in the network's conventions."""
         given = np.array(points, np.float32)
         if self._axes == RIGHT:
             given[:, 0], given[:, 1] = -points[:, 1], points[:, 0]
@@ -85,9 +86,9 @@ class NetworkDetector:
         scores: Floats,
         velocities: Floats | None = None,
     ) -> Detections:
-        """What the network answers to `points` (P, k), as detections: `labels` (n,) into its
-        classes, `boxes` (n, 7) centre, length, width, height and yaw in its axes, `scores` (n,),
-        `velocities` (n, 2) or None.
+        """Return the network's output for `points` (P, k) as detections. `labels` (n,) index its
+        classes. `boxes` (n, 7) are centre, length, width, height and yaw in its axes. `scores` are
+        (n,), `velocities` (n, 2) or None.
 
         Raises InvalidInput for a label that no class has.
         """
@@ -98,7 +99,7 @@ class NetworkDetector:
                 f"have 0 to {len(self._labels) - 1}; name them all in classes"
             )
         kept = self._labels[labels] >= 0
-        # Wrong shapes are named where all answers are checked; nothing has any shape.
+        # Wrong shapes are reported where all outputs are checked; empty outputs may have any shape.
         own = np.asarray(boxes, float)[kept] if labels.size else np.empty((0, 7))
         moves = None if velocities is None else np.asarray(velocities, float)[kept]
         if self._axes == RIGHT and labels.size:
@@ -109,12 +110,12 @@ class NetworkDetector:
 
 
 class NetworkFile(NetworkDetector):
-    """A network in a `file`, which runs on a `device`. Raises InvalidInput for a file that is
-    missing or holds no such network, MissingExtra without its library.
+    """A network in a `file` that runs on a `device`. Raises InvalidInput for a file that is missing
+    or holds no such network, MissingExtra without its library.
     """
 
     allowed: ClassVar[str]
-    """A file of this kind, as a refusal names it."""
+    """Name of this kind of file in messages."""
 
     def __init__(
         self,
@@ -139,10 +140,10 @@ class NetworkFile(NetworkDetector):
 class TorchScriptDetector(NetworkFile):
     """Runs a TorchScript module: `forward(points, sensor_height_m) -> (classes, boxes, scores)`.
 
-    `points` is a float32 tensor (P, k) with the `fields`, `sensor_height_m` a float; `classes`
-    (n,), `boxes` (n, 7), `scores` (n,) and, as a fourth output, `velocities` (n, 2) are those of
-    `NetworkDetector.detections`. `device`: cpu, cuda, cuda:1. Stateless unless `forward` writes to
-    the module, or cannot be shown not to. A module that draws random numbers draws the same ones in
+    Inputs: `points`, a float32 tensor (P, k) with the `fields`, and `sensor_height_m`, a float. The
+    outputs `classes` (n,), `boxes` (n, 7), `scores` (n,) and optionally `velocities` (n, 2) are
+    those of `NetworkDetector.detections`. `device`: cpu, cuda, cuda:1. Stateless if `forward`
+    provably never writes to the module. A module that draws random numbers draws the same ones in
     every call. Needs torch.
     """
 
@@ -169,12 +170,12 @@ class TorchScriptDetector(NetworkFile):
             # In a frozen copy all is constant that no method writes.
             graph = torch.jit.freeze(self._module, optimize_numerics=False).graph
         except RuntimeError:
-            # Some modules that run cannot be frozen, so nothing is known of them.
+            # Some working modules cannot be frozen, so they are not known to be stateless.
             self.stateless, self._draws = False, True
             return
         nodes = [*_nodes(graph)]
         kinds = {node.kind() for node in nodes}
-        # What a fork runs is not among the nodes.
+        # The nodes do not include those of a fork.
         self.stateless = kinds.isdisjoint(("prim::GetAttr", "prim::fork"))
         self._draws = "prim::fork" in kinds or any(node.isNondeterministic() for node in nodes)
 
@@ -189,7 +190,7 @@ class TorchScriptDetector(NetworkFile):
         return self.detections(points, *(output.detach().cpu().numpy() for output in outputs))
 
     def __getstate__(self) -> dict[str, Any]:
-        # A module that writes to itself: the file has what it held at first.
+        # A module that writes to itself is read again from the file in its initial state.
         written = BytesIO()
         import_torch().jit.save(self._module, written)
         return vars(self) | {"_module": written.getvalue()}
@@ -210,16 +211,16 @@ def _nodes(block: Any) -> Iterator[Any]:
 
 @contextmanager
 def _same_draws(torch: Any, device: str) -> Iterator[None]:
-    """Random numbers of PyTorch begin anew, and go on afterwards as if none had been drawn."""
+    """Restart PyTorch's random numbers within the block, and restore their state afterwards."""
     with _DRAWING, torch.random.fork_rng([device] if device.startswith("cuda") else []):
         torch.manual_seed(0)
         yield
 
 
 class OnnxDetector(NetworkFile):
-    """Runs an ONNX file: inputs `points` (P, k) float32 and, if the network has it,
-    `sensor_height_m` (1,) float32; outputs in the order classes, boxes, scores, and velocities if
-    it has them, as of `TorchScriptDetector`.
+    """Runs an ONNX file. Inputs: `points` (P, k) float32 and optionally `sensor_height_m` (1,)
+    float32. Outputs, in order: classes, boxes, scores, and optionally velocities, as of
+    `TorchScriptDetector`.
 
     `device`: cpu or cuda, for which ONNX Runtime needs its own package. A network that draws random
     numbers raises InvalidInput: they depend on all earlier calls. Needs onnxruntime.
@@ -274,8 +275,8 @@ def _external_data(file: Path, content: bytes) -> Iterator[str]:
 
 
 def has_point_in(limits: Sequence[float], points: np.ndarray) -> bool:
-    """Whether one of `points` (P, k) lies within `limits`, the least x, y, z and the most: without
-    one a network of voxels fails.
+    """Return True if one of `points` (P, k) lies within `limits` (least x, y, z, then greatest). A
+    network of voxels fails without one.
     """
     low, high = np.split(np.asarray(limits, float), 2)
     return bool(np.all((points[:, :3] >= low) & (points[:, :3] < high), axis=1).any())

@@ -1,7 +1,7 @@
-"""Detectors: the interface of a real one, which is handed points and no truth.
+"""The interface of detectors. Real ones get points and no truth.
 
-`PointsOnly` is the one place where a film meets a real detector. Whatever is installed or loaded
-goes through it.
+`PointsOnly` is the only place where a film meets a real detector. Every installed or loaded
+detector goes through it.
 """
 
 import pickle
@@ -23,13 +23,13 @@ from care_sim.sensors.annotated import AT_KEYFRAME, NO_OBJECT, Annotations, Clou
 
 
 class Detector(ABC):
-    """A loop calls it at every keyframe.
+    """A detector, which a loop calls at every keyframe.
 
-    `gathers`: how many sweeps it is given at once in the closed loop, its own keyframe's among
-    them. `track_score`: the least score of a detection that becomes a track. `files`: what else it
-    reads than the files that its parameters and its entry point name. `wants_points`: whether it
-    reads more of a cloud than cells and objects. `is_matched`: whether each detection is of the
-    object behind it, so that the scoring need not match their places.
+    `gathers`: number of sweeps per keyframe in the closed loop, its own included. `track_score`:
+    least score of a detection that becomes a track. `files`: further files that it reads, beside
+    those of its parameters and entry point. `wants_points`: whether it reads more of a cloud than
+    cells and objects. `is_matched`: whether each detection belongs to the object behind it, so that
+    the scoring need not match their places.
     """
 
     gathers: int = 1
@@ -39,21 +39,21 @@ class Detector(ABC):
     files: tuple[Path, ...] = ()
 
     def begin(self, seed: np.random.SeedSequence, rig: Rig, is_filmed: bool) -> "Detector":
-        """Return the detector of an episode with this `seed`: itself where it remembers nothing of
-        another one. `is_filmed` says whether a film is played, whose keyframes may be several
-        sweeps apart.
+        """Return the detector of an episode with this `seed`: itself if it is stateless.
+        `is_filmed` is True for a film, whose keyframes may be several sweeps apart.
         """
         return self
 
     def at(self, token: str | None, sensor: Frame) -> None:
-        """Take note of the coming keyframe: its name in a film, None in the closed loop, and where
-        the sensor is.
+        """Set the next keyframe: its name in a film, None in the closed loop, and the sensor's
+        frame.
         """
 
     @abstractmethod
     def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
-        """Detections in the sensor frame from the returns of the fired cells, and (n,) the
-        annotated object behind each, or NO_OBJECT, for privileged policies and the scoring.
+        """Return detections in the sensor frame from the returns of the fired cells. Also returns
+        (n,) the annotated object behind each, or NO_OBJECT, for privileged policies and the
+        scoring.
         """
 
 
@@ -68,20 +68,20 @@ ATTRIBUTES = (
     "pedestrian.sitting_lying_down", "pedestrian.standing", "vehicle.moving", "vehicle.parked",
     "vehicle.stopped",
 )  # fmt: skip
-"""Those of nuScenes, and none."""
+"""Attributes of nuScenes, and an empty one."""
 _WIDTHS = {"boxes": 7, "velocities": 2}
 """Numbers per detection, of columns with several."""
 
 
 class BrokenDetector(InvalidInput):
-    """A detector that cannot be loaded or made, fails, or returns what is no `Detections`."""
+    """A detector that cannot be loaded or made, fails, or returns no valid `Detections`."""
 
 
 FIELDS = ("x", "y", "z", "intensity", "ring", "time_lag")
-"""What a detector may ask of every point. Places in the sensor frame, metres. `intensity` from 0 to
-1, 0 where nothing measured it, as in generated worlds without `lidar_stated_range_m`. `ring`: the
-laser, 0 the lowest, as nuScenes counts. `time_lag`: seconds since the point was measured, 0 or
-more, as CenterPoint counts.
+"""Columns of points that a detector may request. Places are in the sensor frame, metres.
+`intensity` from 0 to 1; 0 where it is not measured, as in generated worlds without
+`lidar_stated_range_m`. `ring`: the laser, 0 the lowest, as nuScenes counts. `time_lag`: seconds
+since the point was measured, 0 or more, as CenterPoint counts.
 """
 
 
@@ -89,34 +89,34 @@ class PointDetector(Protocol):
     """A real detector: returns boxes from the points of one keyframe.
 
     A detector is made anew for every play, so that it carries nothing from one play to the next.
-    Set `stateless = True` where an answer depends on the arguments of `detect` alone: not on
-    earlier calls, nor on random numbers of the process. A stateless detector is made once per
-    process and set of parameters, serves all plays there, and may be called by two threads at once.
-    A copy of an environment shares a stateless detector, and a pickle makes it again from its
-    parameters. Any other detector is copied and pickled with what it remembers.
+    Set `stateless = True` if its results depend only on the arguments of `detect`: not on earlier
+    calls, nor on random numbers of the process. A stateless detector is made once per process and
+    set of parameters, and serves all plays there. Two threads may call it at once. Copies of an
+    environment share it, and a pickle makes it again from its parameters. Any other detector is
+    copied and pickled with its state.
 
-    Further attributes say what a detector is fed. All of them are optional:
+    Further optional attributes set a detector's input:
 
-    - `fields`: columns of the points, of `FIELDS`; x, y and z without it.
-    - `sweeps`: how many sweeps it is fed at a keyframe (1). In films, `--sweeps` counts before it.
+    - `fields`: columns of the points, from `FIELDS` (x, y and z).
+    - `sweeps`: number of sweeps per keyframe (1). In films, `--sweeps` overrides it.
     - `track_score`: the least score of a detection that becomes a track (0). All are exported.
-    - `far`: whether it gets points beyond the reach of the grid, which a recorded LiDAR has (True).
+    - `far`: whether it gets a recorded LiDAR's points beyond the reach of the grid (True).
     - `wants_poses`: whether `detect` gets the `poses` of the sweeps (False).
 
     A detector whose files name further files, such as the base of a config, sets `files` to their
-    paths when it is made. They belong to the hash of a row, and a detector is made anew after one
-    of them has changed.
+    paths when it is made. The hash of a row covers them, and a detector is made anew after one of
+    them has changed.
 
     `sweeps` and `track_score` are also parameters of every detector by name.
     """
 
     def detect(self, points: Floats, sensor_height_m: float) -> Detections:
-        """Detections in the sensor frame from points (P, 3), or (P, k) with the `fields` asked for;
-        P may be 0.
+        """Return detections in the sensor frame from points (P, 3), or (P, k) with `fields`; P may
+        be 0.
 
-        The sensor is `sensor_height_m` above the road. The points are the detector's own to change.
-        Points of earlier sweeps are moved by how the car moved since, others' motion is not undone.
-        `poses`, where wanted, are `SweepPose`s, the keyframe's first.
+        The sensor is `sensor_height_m` above the road. The detector may change the points. Points
+        of earlier sweeps compensate the car's motion, not that of others. `poses`, if wanted, are
+        `SweepPose`s, the keyframe's first.
 
         `returns` are the points on each object, `scores` confidences from 0 to 1, or None,
         `velocities` and `attributes` the detector's own, or None; at most MOST_DETECTIONS.
@@ -124,26 +124,26 @@ class PointDetector(Protocol):
 
 
 def is_stateless(detector: object) -> bool:
-    """Whether a detector promises that its answers depend on what it is handed alone."""
+    """Return True if a detector promises that its results depend only on its arguments."""
     return getattr(detector, "stateless", False) is True
 
 
 def files_of(detector: object) -> tuple[Path, ...]:
-    """The files that a detector said it reads when it was made; those of its class are of its entry
-    point.
+    """Return the files that a detector declared when it was made. Files of its class belong to its
+    entry point.
     """
     files = getattr(detector, "files", None)
     return () if files is getattr(type(detector), "files", None) else tuple(map(Path, files or ()))
 
 
 class PointsOnly(Detector):
-    """Makes a `PointDetector` a `care_sim.perception.points_only.Detector`.
+    """Wraps a `PointDetector` as a `care_sim.perception.points_only.Detector`.
 
-    The detector gets a copy of the points: neither objects nor boxes nor unfired cells can be
-    reached from it. What it returns is copied and checked; only then the objects are named.
+    The detector gets a copy of the points. It cannot reach objects, boxes or unfired cells. Its
+    results are copied and checked; only then the objects are named.
 
-    `again` makes the same once more, for another play or in another process. Without it one
-    detector serves all plays, and a pickle holds it whole.
+    `again` makes the same detector for another play or process. Without it one detector serves all
+    plays, and a pickle holds it whole.
     """
 
     def __init__(
@@ -184,7 +184,7 @@ class PointsOnly(Detector):
     def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
         """See `care_sim.perception.points_only.Detector`.
 
-        Raises BrokenDetector where it fails or returns what is no detections.
+        Raises BrokenDetector if the detector fails or returns no valid detections.
         """
         self._has_played = True
         poses = cloud.poses or (AT_KEYFRAME,)
@@ -217,7 +217,7 @@ class PointsOnly(Detector):
     def __reduce_ex__(self, protocol: SupportsIndex) -> Any:
         if is_stateless(self._detector) and self._again is not None:
             return self._again, ()
-        # Once in vain, for a line that names the detector.
+        # Pickle once in advance, for an error that names the detector.
         self._copied(pickle.dumps, protocol)
         return super().__reduce_ex__(protocol)
 
@@ -231,14 +231,14 @@ class PointsOnly(Detector):
             ) from error
 
     def _mend(self) -> str:
-        """What makes a copy possible."""
+        """Return the hint that makes a copy possible."""
         if is_stateless(self._detector):
             return "make it by name (`care_sim.perception.detectors.make_detector`)"
         return "set `stateless = True` if its answers depend on the arguments of `detect` alone"
 
 
 def _column(cloud: Cloud, field: str) -> Floats | Integers:
-    """(P,) a field of the returns."""
+    """Return (P,) a field of the returns."""
     if field in FIELDS[:3]:
         return cloud.points[:, FIELDS.index(field)]
     values = {"intensity": cloud.intensities, "ring": cloud.rings, "time_lag": cloud.times}[field]
@@ -248,12 +248,12 @@ def _column(cloud: Cloud, field: str) -> Floats | Integers:
 
 
 def inside(points: Floats, boxes: Floats) -> Mask:
-    """(n, P) whether each of points (P, 3) lies in each of boxes (n, 7). Raises InvalidInput for
-    other boxes.
+    """Return (n, P) whether each of points (P, 3) lies in each of boxes (n, 7). Raises InvalidInput
+    for other boxes.
     """
     if boxes.ndim != 2 or boxes.shape[1] != 7:
         raise InvalidInput(f"boxes must have the shape (n, 7), got {boxes.shape}")
-    # In the axes of a box, what lies within half its size along each of them lies in it.
+    # In the axes of a box, a point within half its size along each axis is inside.
     rows = [
         np.all(np.abs(turned(points - box[:3], -box[6])) <= box[3:6] / 2, axis=1) for box in boxes
     ]
@@ -261,8 +261,8 @@ def inside(points: Floats, boxes: Floats) -> Mask:
 
 
 def checked(name: str, found: Any, points: int) -> Detections:
-    """`found` among so many `points`, with arrays of the contract's types; without detections they
-    may be empty lists.
+    """Return `found` among this many `points`, with arrays of the contract's types. Without
+    detections they may be empty lists.
 
     Raises BrokenDetector with the detector's `name` and the fault.
     """
@@ -298,8 +298,8 @@ def checked(name: str, found: Any, points: int) -> Detections:
 
 
 def objects_behind(boxes: Floats, cloud: Cloud) -> Integers:
-    """(n,) the object that most of the returns within each box lie on, or NO_OBJECT."""
-    # Returns on nobody have no vote: a box that stands on the road holds some of it.
+    """Return (n,) the object with most of the returns within each box, or NO_OBJECT."""
+    # Returns without an object do not count: a box on the road holds some of the road.
     named = cloud.objects != NO_OBJECT
     objects = cloud.objects[named]
     counts = [
@@ -318,7 +318,7 @@ def _numbers(name: str, column: str, values: Any) -> Floats:
         raise BrokenDetector(
             f"detector {name}: {column} must be an array of numbers, got {values!r:.80}"
         ) from error
-    # What is detected ends in observations, which are float32. NaN fails this comparison, too.
+    # Detections enter observations, which are float32. NaN fails this comparison, too.
     if not (np.abs(numbers) <= np.finfo(np.float32).max).all():
         raise BrokenDetector(f"detector {name}: {column} must be finite, in single precision")
     if numbers.size:
@@ -329,7 +329,7 @@ def _numbers(name: str, column: str, values: Any) -> Floats:
 def _faults(
     points: int, classes: Floats, boxes: Floats, returns: Floats, scores: Floats | None = None
 ) -> list[str]:
-    # What must hold, each beside the sentence for whoever breaks it.
+    # Conditions, each with the message for a violation.
     rules: dict[str, Mask | bool] = {
         f"at most {MOST_DETECTIONS} detections are allowed, got {len(classes)}": len(classes)
         <= MOST_DETECTIONS,

@@ -1,8 +1,7 @@
-"""The proxy detectors, which read whose return each one is.
+"""The proxy detectors, which read the object behind each return.
 
-A real detector sees points alone and is made a `care_sim.perception.points_only.Detector` by
-`care_sim.perception.points_only.PointsOnly`; `care_sim.perception.detectors.make_detector` gives
-either by name.
+A real detector reads only points, and `care_sim.perception.points_only.PointsOnly` wraps it.
+`care_sim.perception.detectors.make_detector` returns either by name.
 """
 
 from collections.abc import Callable, Mapping
@@ -18,7 +17,7 @@ from care_sim.perception.points_only import Detector
 from care_sim.sensors.annotated import Annotations, Cloud
 
 _WIDEST = 4096
-"""Hits are counted by body id in tables that are no wider."""
+"""Largest width of the tables that count hits by body id."""
 
 
 class ReturnsRule:
@@ -36,9 +35,10 @@ class ReturnsRule:
     def detections(
         self, hits: Integers, boxes_of: Callable[[Integers], Floats]
     ) -> tuple[Detections, Integers]:
-        """Detections from the body id behind every fired ray, and the detected ids for the scoring.
+        """Return detections from the body id behind every fired ray, and the detected ids for the
+        scoring.
 
-        `boxes_of` gives the (n, 7) sensor-frame boxes of bodies (n,).
+        `boxes_of` returns the (n, 7) sensor-frame boxes of bodies (n,).
         """
         kept, returns = _hit_often(self._bodies, hits, self._min_returns)
         bodies = self._bodies[kept]
@@ -47,8 +47,8 @@ class ReturnsRule:
 
 @compiled()
 def _hit_often(bodies: Integers, hits: Integers, least: int) -> tuple[Integers, Integers]:
-    """The rows (k,) of those of `bodies` (n,), ascending ids, that are at least so often among the
-    `hits`, and how often they are.
+    """Return the rows (k,) of the `bodies` (n,), ascending ids, with at least this many `hits`, and
+    their numbers of hits.
     """
     counts = count_hits(bodies, hits)
     kept = np.empty(len(bodies), np.int64)
@@ -62,7 +62,7 @@ def _hit_often(bodies: Integers, hits: Integers, least: int) -> tuple[Integers, 
 
 @compiled()
 def count_hits(bodies: Integers, hits: Integers) -> Integers:
-    """(n,) how often each of `bodies` (n,), ascending ids, is among the `hits`."""
+    """Return (n,) the number of `hits` of each of `bodies` (n,), ascending ids."""
     counts = np.zeros(len(bodies), np.int64)
     if len(bodies) == 0:
         return counts
@@ -73,8 +73,8 @@ def count_hits(bodies: Integers, hits: Integers) -> Integers:
             _count_among(bodies, hit, counts)
         return counts
 
-    # Neighbouring rays mostly hit the same body, and to count it again waits for the count before:
-    # so they count in turn in one of four tables. Others count in the last column.
+    # Neighbouring rays mostly hit the same body, and each count would wait for the previous one. So
+    # rays take turns in four tables. Unlisted bodies count in the last column.
     table = np.zeros((4, span + 1), np.int64)
     for n in range(len(hits)):
         place = hits[n] - first
@@ -128,33 +128,34 @@ _PEOPLE = (
     (2, 3, 4, 6, 13, 24),
     (0.0, 0.60, 0.82, 0.89, 0.90, 0.96),
 )
-"""Numbers of returns, and the share that is found; people are those on foot and on bicycles.
-Between two numbers the share grows with the logarithm of the number. The dip that cars have about
-eight returns is levelled out."""
+"""Numbers of returns, and the share detected; people are on foot or on bicycles. Between two
+numbers the share is linear in the logarithm of the number. The dip of cars at about eight returns
+is levelled out.
+"""
 CURVES = {name: _PEOPLE if name in ("bicycle", "pedestrian") else _VEHICLES for name in CLASSES}
 
 
 def chance(name: str, returns: Integers) -> Floats:
-    """(n,) how probably an object of the class `name` is detected with `returns` (n,) on it."""
+    """Return (n,) the detection probability of an object of class `name` with `returns` (n,)."""
     numbers, shares = CURVES[name]
     known = np.log(np.maximum(returns, 1))
     return np.asarray(np.interp(known, np.log(numbers), shares))
 
 
 class GradedProxy(Detector):
-    """A proxy that is the surer the more rays hit an object, as a real detector is.
+    """A proxy that detects by chance, more probably with more returns, as real detectors do.
 
     Every object is detected with its true box, by chance: the more returns, the more probably.
 
-    The paper's proxy is a step: an object is detected from three returns on, always. A real
-    detector begins later and is never certain. `CURVES` are those of the detector `cluster`: the
-    share of annotated objects within 50 m that it finds, by how many returns of the full scan lie
-    on them, over every fourth keyframe of the 20 calibration streets (4,500 objects). Vehicles need
-    more returns than people, since a part of one is taken for something smaller.
+    The paper's proxy is a step: an object is always detected from three returns on. A real detector
+    begins later and is never certain. `CURVES` are measured on the detector `cluster`: its recall
+    of annotated objects within 50 m, by their returns in a full scan. They cover every fourth
+    keyframe of the 20 calibration streets (4,500 objects). Vehicles need more returns than people,
+    since a part of one is taken for something smaller.
 
-    The luck of an object hangs on where it is from the sensor alone, in centimetres: it is the same
-    for all policies while their cars drive alike, and more returns never lose an object. Where
-    anything moves it is drawn anew at every keyframe; what stands before a car that stands keeps
+    The luck of an object depends only on its place from the sensor, in centimetres. It is the same
+    for all policies while their cars drive alike, and more returns never lose an object. Luck is
+    drawn anew at every keyframe if anything moves. A standing object before a standing car keeps
     its luck.
     """
 
@@ -178,8 +179,8 @@ class GradedProxy(Detector):
 
 
 def _luck(boxes: Floats) -> Floats:
-    """(n,) from 0 to 1, evenly spread, from where the centres of boxes (n, 7) are in whole
-    centimetres: the same on every processor whose arithmetic agrees that far.
+    """Return (n,) uniform numbers from 0 to 1, from the centres of boxes (n, 7) in whole
+    centimetres. They are equal on every processor whose arithmetic agrees that far.
     """
     x, y = (np.round(boxes[:, axis] * 100).astype(np.int64).astype(np.uint64) for axis in (0, 1))
     # The finaliser of SplitMix64 (Steele, Lea and Flood 2014), which leaves no trace of its input.

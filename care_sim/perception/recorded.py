@@ -1,5 +1,5 @@
-"""Played-back results of a real detector on full scans: an upper bound of what it would report of
-the scans that a policy fires.
+"""Recorded results of a real detector on full scans: an upper bound of its results on a policy's
+scans.
 """
 
 import os
@@ -20,18 +20,18 @@ from care_sim.perception.points_only import ATTRIBUTES, Detector, inside, object
 from care_sim.sensors.annotated import Annotations, Cloud
 
 FARTHEST_M = 1e7
-"""Beyond this no map goes, metres."""
+"""Largest coordinate of a map, metres."""
 _MARGIN_M = 0.2
 """Reported boxes are off by a few centimetres, and returns lie on the surface of the object."""
 
 
 class RecordedDetector(Detector):
-    """Plays back what a detector reported of full scans: an upper bound, not a detector.
+    """Plays back a detector's results on full scans: an upper bound, not a detector.
 
     `file` holds results in the official form of the nuScenes detection task, whose samples are the
-    keyframes of the film. A box counts where `least_returns` of the returns that the policy fired
-    lie in it. The detector saw the full scan, so it might have missed the object in fewer. What
-    scores below `track_score` becomes no track.
+    keyframes of the film. A box counts if it holds `least_returns` of the policy's returns. The
+    detector saw the full scan, so it might have missed the object with fewer. Boxes below
+    `track_score` become no track.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ def _results(path: Path, _stamp: Stamp) -> dict[str, list[Any]]:
 
 
 def _detections(path: Path, token: str, rows: list[Any], sensor: Frame) -> Detections:
-    """The boxes of a sample in its sensor frame. Classes outside the five are left out."""
+    """Return the boxes of a sample in its sensor frame. Classes outside the five are left out."""
     kept, boxes, velocities = [], [], []
     for number, row in enumerate(rows):
         try:
@@ -122,7 +122,7 @@ def _detections(path: Path, token: str, rows: list[Any], sensor: Frame) -> Detec
         kept.append((CLASSES.index(row["detection_name"]), numbers[7], attribute))
     world = np.array(velocities).reshape(-1, 2)
     moves = sensor.vectors_to_local(np.column_stack([world, np.zeros(len(world))]))[:, :2]
-    # Where the detector told no velocity, those of the tracks count.
+    # Without velocities of the detector, those of the tracks are used.
     known = bool((np.abs(world) <= FARTHEST_M).all())
     classes, scores, attributes = zip(*kept, strict=True) if kept else ((), (), ())
     return Detections(

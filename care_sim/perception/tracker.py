@@ -3,10 +3,10 @@
 Tracks are a table (m, 13) in the order of `Tracks.COLUMNS`, by ascending id, in the world frame.
 Detections are their `classes` (n,) and their boxes `seen` (n, 7), in the world frame, too.
 
-A track follows its detections by the straight line of least squares, in recursive form (the
-expanding-memory polynomial filter of degree 1; Morrison 1969, "Introduction to Sequential Smoothing
-and Prediction"; Brookner 1998, "Tracking and Kalman Filtering Made Easy"). A line through two
-detections meets both: then place and velocity are as detected.
+A track is the least-squares line through its detections, in recursive form: the expanding-memory
+polynomial filter of degree 1. Sources: Morrison 1969, "Introduction to Sequential Smoothing and
+Prediction"; Brookner 1998, "Tracking and Kalman Filtering Made Easy". A line through two detections
+meets both: then place and velocity are as detected.
 """
 
 import math
@@ -21,7 +21,7 @@ from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.frames import Frame, turned
 from care_sim.core.types import Detections, Tracks
 
-# Numbers of a module are what compiled code can hold.
+# Compiled code can only read module-level constants.
 _ID, _CLASS, _X, _Y = Tracks.ID, Tracks.CLASS, Tracks.CENTRE.start, Tracks.CENTRE.start + 1
 _VX, _VY = Tracks.VELOCITY.start, Tracks.VELOCITY.start + 1
 _BOX, _BOX_WIDTH = Tracks.BOX.start, Tracks.BOX.stop - Tracks.BOX.start
@@ -35,7 +35,7 @@ Pairs = tuple[Integers, Integers]
 
 
 class Life(NamedTuple):
-    """What association and life of a track follow (`care_sim.perception.tracker.MemoryRules`)."""
+    """Rules of association and life of a track (`care_sim.perception.tracker.MemoryRules`)."""
 
     keyframe_s: float
     gate_m: float
@@ -46,7 +46,7 @@ class Life(NamedTuple):
 
 @compiled()
 def forecast(tracks: Floats, seconds: float) -> Floats:
-    """The tracks `seconds` later, at constant velocity."""
+    """Return the tracks `seconds` later, at constant velocity."""
     moved = tracks.copy()
     forecast_in_place(moved, seconds)
     return moved
@@ -54,23 +54,23 @@ def forecast(tracks: Floats, seconds: float) -> Floats:
 
 @compiled()
 def forecast_in_place(tracks: Floats, seconds: float) -> None:
-    """Let the tracks be `forecast`."""
+    """Move the tracks as `forecast` does, in place."""
     for m in range(len(tracks)):
         tracks[m, _X] += tracks[m, _VX] * seconds
         tracks[m, _Y] += tracks[m, _VY] * seconds
 
 
 @compiled()
-def seen_nearest_first(tracks: Floats, boxes: Floats, turn: tuple[float, float]) -> Floats:
-    """The tracks at other `boxes` (m, 7), those of a sensor's frame, the nearest first. `turn` is
-    the cosine and the sine of the angle by which velocities turn into its axes.
+def sort_by_distance(tracks: Floats, boxes: Floats, turn: tuple[float, float]) -> Floats:
+    """Return the tracks with `boxes` (m, 7) of a sensor's frame, the nearest first. `turn` is the
+    cosine and sine of the angle that turns velocities into its axes.
     """
     cos, sin = turn
     ranges = np.empty(len(tracks))
     seen = np.empty(tracks.shape)
     for m in range(len(tracks)):
-        # Each is put behind all that are not farther: tracks of one distance stay in the order in
-        # which they were begun.
+        # Each goes behind all that are not farther: equally far tracks stay in the order of their
+        # beginning.
         away = math.hypot(boxes[m, 0], boxes[m, 1])
         place = m
         while place > 0 and ranges[place - 1] > away:
@@ -89,8 +89,8 @@ def seen_nearest_first(tracks: Floats, boxes: Floats, turn: tuple[float, float])
 def possible_pairs(
     tracks: Floats, classes: Integers, seen: Floats, rules: Rules
 ) -> tuple[Floats, Mask, Pairs, bool]:
-    """(m, n) metres between forecasts and detections, (m, n) which of them can be one object; the
-    rows of both in such pairs where none is in two, and whether that is so.
+    """Return (m, n) metres between forecasts and detections, and (m, n) which pairs can be one
+    object. Also returns the rows of both in these pairs, and whether no row is in two pairs.
     """
     life = Life(*rules)
     distances = np.empty((len(tracks), len(seen)))
@@ -120,10 +120,10 @@ def possible_pairs(
 
 
 @compiled()
-def lived_on(
+def advance_tracks(
     tracks: Floats, classes: Integers, seen: Floats, pairs: Pairs, rules: Rules, next_id: int
 ) -> tuple[Floats, Integers]:
-    """The tracks a keyframe later, and (n,) the id of the track of every detection.
+    """Return the tracks a keyframe later, and (n,) the id of each detection's track.
 
     `pairs` belong together. A detection without a track begins one, from `next_id` on.
     """
@@ -133,8 +133,8 @@ def lived_on(
     for k in range(len(rows)):
         detected[rows[k]] = columns[k]
 
-    # Who has not been detected for too long is dropped, new ones come last. Ids count up and are
-    # never given again, so each means one object.
+    # Tracks without a detection for too long are dropped; new ones come last. Ids count up and are
+    # never reused, so each means one object.
     result = np.empty((len(tracks) + len(seen), tracks.shape[1]))
     ids = np.full(len(seen), -1)
     count = 0
@@ -160,8 +160,8 @@ def lived_on(
 
 @compiled()
 def _follow(track: Floats, box: Floats, elapsed: float, life: Life) -> None:
-    """Let a track follow the `box` (7,) on which it is detected, `elapsed` seconds after the last:
-    size, height and yaw are those of the box.
+    """Update a track with its detected `box` (7,), `elapsed` seconds after the last one. Size,
+    height and yaw are the box's.
     """
     before = min(track[_HITS], life.velocity_keyframes - 1)
     if before < 2:
@@ -184,8 +184,8 @@ def _follow(track: Floats, box: Floats, elapsed: float, life: Life) -> None:
 
 @compiled()
 def _gains(before: float, steps: float) -> tuple[float, float]:
-    """What part of the way from a forecast to its detection is added to the place, and, per
-    keyframe, to the velocity.
+    """Return the gains: the share of the way from a forecast to its detection that is added to the
+    place, and, per keyframe, to the velocity.
 
     The forecast is `steps` keyframes ahead of a line through `before` detections, one a keyframe
     and all with errors of variance 1. With 1 step and n = before + 1 they are the usual alpha =
@@ -201,7 +201,7 @@ def _gains(before: float, steps: float) -> tuple[float, float]:
 
 @compiled()
 def _begin(track: Floats, number: int, label: int, box: Floats) -> None:
-    """Make a row the track of what is seen for the first time."""
+    """Make a row the track of a new detection."""
     for k in range(len(track)):
         track[k] = 0.0
     track[_ID], track[_CLASS], track[_HITS] = number, label, 1.0
@@ -229,22 +229,20 @@ class MemoryRules:
     """Association and life of a track."""
 
     gate_m: float = 2.0
-    """A detection further from a forecast is another object (the paper's match distance)."""
+    """A detection farther from a forecast is another object (the paper's match distance)."""
     first_speed_mps: float = 15.0
     """A track seen once has no velocity: its gate grows by this much per second (54 km/h)."""
     coast_s: float = 1.5
-    """An undetected track is forecast this long, then dropped: for 15 keyframes of the closed loop,
-    for 3 of the open one (CenterPoint's tracker: 3 frames at 2 Hz).
+    """An undetected track is forecast this long, then dropped: 15 keyframes of the closed loop, 3
+    of the open one (CenterPoint's tracker: 3 frames at 2 Hz).
     """
     velocity_keyframes: int = 2
-    """Place and velocity are a line through so many detections. From there on the gains are held:
-    the filter forgets older ones little by little.
+    """Place and velocity are a line through this many detections. Then the gains stay constant: the
+    filter slowly forgets older detections.
     """
 
     def life(self, keyframe_s: float) -> Rules:
-        """These rules where keyframes are `keyframe_s` seconds apart, as compiled code takes
-        them.
-        """
+        """Return these rules for keyframes `keyframe_s` seconds apart, for compiled code."""
         # Plain numbers, which compiled code takes at once.
         return (
             float(keyframe_s),
@@ -258,8 +256,8 @@ class MemoryRules:
 class TrackMemory:
     """The tracks of an episode.
 
-    They are kept in the world frame, so that the ego's motion is compensated, and are given and
-    taken in the sensor frame.
+    Tracks are stored in the world frame, which compensates the ego's motion. Methods take and
+    return them in the sensor frame.
     """
 
     def __init__(self, keyframe_s: float, rules: MemoryRules = MemoryRules()):
@@ -275,7 +273,7 @@ class TrackMemory:
         estimates.
         """
         boxes = sensor.boxes_to_local(self._table[:, Tracks.BOX])
-        return Tracks.from_checked_rows(seen_nearest_first(self._table, boxes, sensor.turn_back))
+        return Tracks.from_checked_rows(sort_by_distance(self._table, boxes, sensor.turn_back))
 
     def predict(self) -> None:
         """Move every track one keyframe ahead at constant velocity."""
@@ -288,26 +286,28 @@ class TrackMemory:
         """
         classes = np.ascontiguousarray(detections.classes, np.int64)
         seen = sensor.boxes_to_world(detections.boxes)
-        pairs = assigned(self._table, classes, seen, self._life)
-        self._table, ids = lived_on(self._table, classes, seen, pairs, self._life, self._next_id)
+        pairs = assign_pairs(self._table, classes, seen, self._life)
+        self._table, ids = advance_tracks(
+            self._table, classes, seen, pairs, self._life, self._next_id
+        )
         self._next_id = max(self._next_id, ids.max(initial=-1) + 1)
         return ids
 
     def velocities(self, ids: Integers, sensor: Frame) -> Floats:
-        """(n, 2) over ground, in the axes of `sensor`, of the tracks that `update` has just told; 0
-        of a new one.
+        """Return (n, 2) velocities over ground, in the axes of `sensor`, of the tracks that
+        `update` just returned; 0 for a new one.
         """
         # New tracks come last with higher numbers, and dropping keeps the order: ids ascend.
         rows = np.searchsorted(self._table[:, Tracks.ID], ids)
         return turned(self._table[rows, Tracks.VELOCITY], -sensor.yaw)
 
 
-def assigned(tracks: Floats, classes: Integers, seen: Floats, life: Rules) -> Pairs:
-    """The rows (k,) of forecasts and of detections that belong together, pair by pair."""
+def assign_pairs(tracks: Floats, classes: Integers, seen: Floats, life: Rules) -> Pairs:
+    """Return the rows (k,) of matching forecasts and detections, pair by pair."""
     from scipy.optimize import linear_sum_assignment
 
     distances, possible, pairs, alone = possible_pairs(tracks, classes, seen, life)
-    # Nearly always each can be one alone, and all pairs belong together.
+    # Nearly always no row is in two pairs, and all pairs match.
     if alone:
         return pairs
 

@@ -94,9 +94,8 @@ BUILT_IN: dict[str, PolicyMaker | EntryPoint] = {
         PlaceHulls,
     )
 }
-# Loaded when they are asked for, as those of installed packages are: they play scenarios by
-# themselves, and their traffic (highway-env, which brings pandas and Matplotlib) doubles the time
-# of every import.
+# Loaded on use, like those of installed packages. They play scenarios themselves, and their traffic
+# (highway-env with pandas and Matplotlib) doubles the time of every import.
 BUILT_IN |= {
     name: EntryPoint(name, f"care_sim.policies.controls.rehearsed:{made}", "care_sim.policies")
     for name, made in {
@@ -110,17 +109,17 @@ POLICIES: Plugins[Policy] = Plugins("policy", "care_sim.policies", BUILT_IN, pol
 
 
 def policy_names() -> list[str]:
-    """Names that `make_policy` knows: the built-in ones, then those of installed packages."""
+    """Return the names for `make_policy`: the built-in ones, then those of installed packages."""
     return POLICIES.names()
 
 
 def contenders() -> list[str]:
-    """The policies that `all` stands for: every one that is no control."""
+    """Return the policies that `all` stands for: all but controls."""
     return [name for name in policy_names() if "control" not in tags_of(name)]
 
 
 def controls() -> list[str]:
-    """The built-in controls that a car can have: patterns that no camera moves."""
+    """Return the built-in controls that a car can have: patterns without a camera."""
     return [
         name for name in BUILT_IN if "control" in tags_of(name) and "generator" not in tags_of(name)
     ]
@@ -142,8 +141,8 @@ def tags_of(name: str) -> tuple[str, ...]:
 
 
 def is_pattern(name: str) -> bool:
-    """Whether the policy fires the same under every `cell_order`, as it says itself; not of one
-    that cannot be loaded.
+    """Return True if the policy declares that it fires the same under every `cell_order`. False for
+    one that cannot be loaded.
     """
     try:
         return bool(getattr(maker(name), "is_pattern", Policy.is_pattern))
@@ -158,20 +157,21 @@ def make_policy(
 @overload
 def make_policy(name: str, env: gymnasium.Env, /, **parameters: object) -> Policy: ...
 def make_policy(name: str, env: _AnyEnv, /, **parameters: object) -> Policy | VectorPolicy:
-    """A policy for an environment of CARE-Sim, or one for all worlds of a vector environment. A
-    privileged one is handed the truth, the others the rig alone.
+    """Return a policy for an environment of CARE-Sim, or one for all worlds of a vector
+    environment. A privileged policy gets the truth, others only the rig.
 
-    Raises InvalidInput for an unknown name or parameter, a value that the policy does not allow, an
-    environment without a rig, one behind wrappers that change what is seen or done, or a privileged
-    policy for many worlds; BrokenPolicy for one that cannot be loaded or made; MissingExtra for one
-    whose library is not installed.
+    Raises InvalidInput for an unknown name or parameter, or a value that the policy does not allow.
+    Raises InvalidInput for an environment without a rig or behind wrappers that change observations
+    or actions, and for a privileged policy of many worlds. Raises BrokenPolicy for a policy that
+    cannot be loaded or made, MissingExtra for one whose library is not installed.
     """
     check_policy(name)
     try:
         make = maker(name)
     except InvalidInput as error:
         raise BrokenPolicy(f"policy {name} cannot be loaded: {error}") from error
-    # What the environment gives comes first: rig, truth, and what the policy says it is told.
+    # Arguments from the environment come first: rig, truth, and the settings in the policy's
+    # `told`.
     rigs = _of_environment(name, env, "rig")
     _check_unwrapped(name, env)
     check_parameters(name, make, parameters)
@@ -184,7 +184,7 @@ def make_policy(name: str, env: _AnyEnv, /, **parameters: object) -> Policy | Ve
             )
         truth = _of_environment(name, env, "truth")
     for parameter, setting in getattr(make, "told", Policy.told).items():
-        parameters.setdefault(parameter, _told(env, setting))
+        parameters.setdefault(parameter, _setting_of(env, setting))
     makers = [partial(made, name, make, [rig, *truth], parameters) for rig in rigs]
     if isinstance(env, gymnasium.vector.VectorEnv):
         return policy_of_rigs(makers, rigs)
@@ -192,7 +192,7 @@ def make_policy(name: str, env: _AnyEnv, /, **parameters: object) -> Policy | Ve
 
 
 def maker(name: str) -> PolicyMaker:
-    """Return the maker of a policy, in a process of its own where policies of others are isolated.
+    """Return the maker of a policy, in its own process if foreign policies are isolated.
 
     Raises InvalidInput with the reason for one that cannot be loaded.
     """
@@ -202,7 +202,7 @@ def maker(name: str) -> PolicyMaker:
 
 
 def _check_unwrapped(name: str, env: _AnyEnv) -> None:
-    # Wrappers that leave both spaces as they are may stay: they watch, or count steps.
+    # Wrappers that keep both spaces may stay: they watch, or count steps.
     inner = env.unwrapped
     if (env.observation_space, env.action_space) != (inner.observation_space, inner.action_space):
         raise InvalidInput(
@@ -223,7 +223,7 @@ def _of_environment(name: str, env: _AnyEnv, attribute: str) -> list[Any]:
         ) from error
 
 
-def _told(env: _AnyEnv, setting: str) -> object:
+def _setting_of(env: _AnyEnv, setting: str) -> object:
     """A setting of the environment, None where the environment has no such setting."""
     if not isinstance(env, gymnasium.vector.VectorEnv):
         value = getattr(env.unwrapped, setting, None)
@@ -232,5 +232,5 @@ def _told(env: _AnyEnv, setting: str) -> object:
             value = shared_attribute(env, setting)
         except AttributeError:
             return None
-    # A scenario of somebody else may keep more than its fields, such as a world that it built.
+    # A foreign scenario may hold more than its fields, such as a world that it built.
     return replace(value) if is_dataclass(value) and not isinstance(value, type) else value

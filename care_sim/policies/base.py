@@ -1,5 +1,5 @@
 """Base classes of policies: a Belief in, a Demand out; the shared allocator does the rest. A
-privileged one also gets the truth, through a door of its own.
+privileged policy also gets the truth, as a separate argument.
 """
 
 from abc import ABC, abstractmethod
@@ -23,30 +23,32 @@ from care_sim.core.types import Action, Demand
 from care_sim.loops.truth import Truth
 
 TAGS = ("causal", "privileged", "non-causal", "learned", "generator", "control")
-"""What a policy can be. "causal": it knows what a car knows. "privileged": it is handed truth.
-"non-causal": it chooses from a full scan. "learned": it has trained weights. "generator": it plays
-by the generator of the scenes. "control": it is no contender, and `all` leaves it out.
+"""Tags of policies. "causal": it knows what a car knows. "privileged": it gets truth. "non-causal":
+it chooses from a full scan. "learned": it has trained weights. "generator": it uses the generator
+of the scenes. "control": it is no contender, and `all` leaves it out.
 """
 TOLD = ("min_returns", "scenario")
-"""The settings of an environment that `Policy.told` may name. They are public, and none of them
-leads to the running episode.
+"""Settings of an environment that `Policy.told` may name. They are public, and none reveals the
+running episode.
 """
 
 
 class Policy(ABC):
-    """A scripted policy. Subclasses state the idea and its source, and implement `demand`. Those
-    with a memory implement `remember` and `reset` too. To call the policy is both, once a keyframe.
+    """A scripted policy. Subclasses state the idea and its source, and implement `demand`. Policies
+    with a memory also implement `remember` and `reset`. A call of the policy runs both, once per
+    keyframe.
 
-    `rig` is what is fixed about the sensing task: grid, cameras, budget, reserve fraction,
+    `rig` holds the fixed parts of the sensing task: grid, cameras, budget, reserve fraction,
     keyframe. `tags` are some of `TAGS`, `source` is the citation in one line. `told` maps
-    parameters to the settings in `TOLD` that `make_policy` fills them from, unless they are given.
-    Two flags leave the demand as it is whatever `cell_order` the rig has: `keeps_order` of a policy
-    that asks `Rig.listed` for its hulls and wedges itself, and `is_pattern` of one that asks for
-    neither and fires the same under every order.
-    `files` are files outside of its package that decide what it does, such as weights: when one
-    changes, episodes are played again. Relative names count from the module.
-    `demanded` is what `demand` last answered a call with, in the order in which it was served, for
-    those who watch.
+    parameters to the settings in `TOLD` from which `make_policy` fills them by default.
+
+    Two flags keep the demand as it is under every `cell_order` of the rig. `keeps_order`: the
+    policy itself calls `Rig.listed` for its hulls and wedges. `is_pattern`: the policy uses neither
+    and fires the same under every order.
+
+    `files` are files outside its package that decide what it does, such as weights: when one
+    changes, episodes are played again. Relative names count from the module. `demanded` is the last
+    result of `demand`, in the order of serving, for viewers.
     """
 
     name: ClassVar[str] = ""
@@ -65,21 +67,21 @@ class Policy(ABC):
         """Forget the episode; called before each one."""
 
     def remember(self, belief: Belief) -> None:
-        """Take in the belief of the coming keyframe; called once for each, before `demand`. What a
-        policy carries from keyframe to keyframe changes here and in `reset` alone.
+        """Store the belief of the next keyframe; called once per keyframe, before `demand`. A
+        policy's memory changes only here and in `reset`.
         """
 
     @abstractmethod
     def demand(self, belief: Belief) -> Demand:
         """Return the demand on the allocator at this keyframe: the sets and layers of Algorithm 1.
-        It follows from the belief and from what was remembered: called again, it is the same.
+        It depends only on the belief and the memory: another call returns the same.
         """
 
     def __call__(self, observation: Observation) -> Action:
-        """The action (E, A) of the environments for an observation.
+        """Return the action (E, A) for an observation.
 
-        Raises InvalidInput for what is no observation of its rig. Raises it too if `demand` returns
-        no Demand, or a cell that the grid does not have.
+        Raises InvalidInput for an observation that does not fit the rig. Also raises it if `demand`
+        returns no Demand, or a cell outside the grid.
         """
         belief = self.rig.read(observation)
         try:
@@ -102,7 +104,9 @@ class Policy(ABC):
         return cells
 
     def _asked_shots(self, cells: Cells) -> Integers | int:
-        """(n,) how often each of the demanded `cells` is to be fired, as the hardware can do it."""
+        """Return (n,) how often to fire each of the demanded `cells`, within the hardware's
+        limits.
+        """
         asked = self.demanded.shots if self.demanded is not None else None
         if asked is None:
             return 1
@@ -116,39 +120,40 @@ class Policy(ABC):
 
 
 class RowPolicy(Policy):
-    """A policy without a memory, whose idea goes by the rows of a belief alone: told once, for any
-    number of worlds. `care_sim.policies.vector` asks it for all worlds of a vector environment.
+    """A policy without a memory that reads only the rows of a belief, so one implementation serves
+    any number of worlds. `care_sim.policies.vector` calls it for all worlds of a vector
+    environment.
     """
 
     @abstractmethod
     def stages(self, beliefs: Beliefs) -> list[WorldSets]:
-        """The sets of exploitation, then those of each reserve layer, of all worlds."""
+        """Return the exploitation sets, then those of each reserve layer, of all worlds."""
 
     def demand(self, belief: Belief) -> Demand:
-        """The stages of one world."""
+        """Return the demand of one world."""
         beliefs = Beliefs.of(belief, self.rig)
         exploitation, *layers = [stage.sets for stage in self.stages(beliefs)]
         return Demand(exploitation, layers)
 
 
 class FixedPolicy(Policy):
-    """A policy that asks for the same at every keyframe, whatever is believed."""
+    """A policy with the same demand at every keyframe, for any belief."""
 
     @abstractmethod
     def fixed(self, budget: int) -> Demand:
-        """Return the demand for a budget of so many cells."""
+        """Return the demand for a budget in cells."""
 
     def demand(self, belief: Belief) -> Demand:
-        """The same at every keyframe."""
+        """Return the same demand at every keyframe."""
         return self.fixed(belief.budget)
 
 
 class PrivilegedPolicy(Policy):
-    """A policy that may ask for the truth about the coming keyframe. It is a bound or a reference:
-    no car can have it.
+    """A policy that may read the truth about the next keyframe. It is a bound or a reference: no
+    car can have it.
 
-    `make_policy` hands `truth` to subclasses of this class and to nobody else. They are never
-    tagged causal, and always privileged or non-causal, whatever they claim.
+    `make_policy` passes `truth` only to subclasses of this class. Their tags never include causal,
+    and always privileged or non-causal, whatever they claim.
     """
 
     tags: ClassVar[tuple[str, ...]] = ("privileged",)
@@ -164,6 +169,6 @@ class PrivilegedPolicy(Policy):
 
 def honest_tags(tags: tuple[str, ...]) -> tuple[str, ...]:
     """Return the tags of a privileged policy: never causal, always privileged or non-causal."""
-    # A subclass of somebody else may claim to be causal; with truth in hand it is not.
+    # A foreign subclass may claim to be causal; with truth it is not.
     honest = tuple(tag for tag in tags if tag != "causal")
     return honest if {"privileged", "non-causal"} & {*honest} else ("privileged", *honest)

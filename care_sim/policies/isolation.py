@@ -1,8 +1,8 @@
-"""Policies of others in processes of their own. Such a process receives the rig, public settings
-and observations, and answers with actions. The environment stays in another process, out of reach
-of frames and of the garbage collector.
+"""Foreign policies in their own processes. Such a process receives the rig, public settings and
+observations, and returns actions. The environment stays in another process, out of reach of frames
+and of the garbage collector.
 
-Answers are read as JSON and plain arrays. They are never unpickled, because that would run code of
+Results are read as JSON and plain arrays. They are never unpickled, because that would run code of
 the policy outside its process.
 """
 
@@ -48,15 +48,15 @@ from care_sim.policies.makers import (
 )
 
 _Load: TypeAlias = Callable[[str], PolicyMaker]
-"""Loads a policy by its name."""
+"""Function that loads a policy by its name."""
 _MOST_BYTES = 2**28
-"""Bytes of an answer at the most; an action of the default grid has 65,536."""
+"""Largest answer in bytes; an action of the default grid has 65,536."""
 _ERRORS = {kind.__name__: kind for kind in (BrokenPolicy, InvalidInput, MissingExtra)}
 """Errors that keep their class on their way out of a process, narrow ones first."""
 
 
 def isolate_policies() -> None:
-    """From now on, load and play policies that are not built in only in processes of their own."""
+    """From now on, load and play policies that are not built in only in their own processes."""
     if _PROCESSES.get() is None:
         _PROCESSES.set({})
 
@@ -78,12 +78,12 @@ def isolated_policies() -> Iterator[None]:
 
 
 def are_isolated() -> bool:
-    """Whether policies that are not built in play in processes of their own."""
+    """Return True if policies that are not built in play in their own processes."""
     return _PROCESSES.get() is not None
 
 
 def policy_process(name: str) -> "PolicyProcess":
-    """The process of a policy, a new one where it has none or where its process has died."""
+    """Return the process of a policy, a new one if it has none or its process has died."""
     processes = _PROCESSES.get()
     assert processes is not None
     if name not in processes or not processes[name].is_usable:
@@ -92,13 +92,13 @@ def policy_process(name: str) -> "PolicyProcess":
 
 
 class PolicyProcess:
-    """The process of the policy `name`: it runs functions that it is asked for, one at a time."""
+    """The process of the policy `name`, which runs requested functions one at a time."""
 
     def __init__(self, name: str):
         self.name = name
         self.is_usable = True
         self._dropped: list[int] = []
-        # A fork would take the memory of this process along, environments and seeds among it.
+        # A fork would copy the memory of this process, environments and seeds included.
         context = get_context("spawn")
         self._connection, theirs = context.Pipe()
         self._process = context.Process(target=_serve, args=(theirs,), name=name, daemon=True)
@@ -107,9 +107,10 @@ class PolicyProcess:
         theirs.close()
 
     def ask(self, function: Callable[..., object], *arguments: object) -> bytes:
-        """Call a function there and return its answer: bytes as they are, anything else as JSON.
+        """Call a function in the process and return its result: bytes as they are, anything else as
+        JSON.
 
-        Raises what the function raises, as a single line, and BrokenPolicy when the process dies.
+        Raises the function's error, as a single line, and BrokenPolicy if the process dies.
         """
         dropped = self._dropped[:]
         del self._dropped[: len(dropped)]
@@ -122,7 +123,7 @@ class PolicyProcess:
             raise BrokenPolicy(f"the process of policy {self.name} died") from error
         if answer[:1] == b"+":
             return answer[1:]
-        raise self.read(_told_error, answer[1:])
+        raise self.read(_rebuild_error, answer[1:])
 
     def read(self, function: Callable[[bytes], Any], answer: bytes) -> Any:
         """Read an answer with a function. Raises BrokenPolicy where the function fails."""
@@ -132,7 +133,7 @@ class PolicyProcess:
             raise BrokenPolicy(f"policy {self.name} answers with no action: {error}") from error
 
     def drop(self, number: int) -> None:
-        """Have the process forget a policy object before its next task."""
+        """Make the process forget a policy object before its next task."""
         self._dropped.append(number)
 
     def end(self) -> None:
@@ -148,7 +149,8 @@ class PolicyProcess:
         self._connection.close()
 
     def _wait(self) -> None:
-        # A process that the policy has forked keeps the connection open, so its end tells nothing.
+        # A process that the policy has forked keeps the connection open, so a closed connection is
+        # no sign of its end.
         while not self._connection.poll(LOOK_S):
             if not self._process.is_alive() and not self._connection.poll(0):
                 raise EOFError
@@ -158,15 +160,13 @@ _PROCESSES: ContextVar[dict[str, PolicyProcess] | None] = ContextVar("processes"
 
 
 class IsolatedMaker:
-    """Makes a policy in its process. Raises InvalidInput with the reason for one that cannot be
-    loaded.
-    """
+    """Makes a policy in its process. Raises InvalidInput with the reason if it cannot be loaded."""
 
     def __init__(self, name: str, load: _Load):
         self._process = policy_process(name)
         self._load = load
         self._process.read(self._describe, self._process.ask(_described, name, load))
-        # Its own code may have answered anything.
+        # Foreign code may have returned anything.
         for fault in policy_faults(self):
             raise InvalidInput(f"{name} {fault}")
 
@@ -178,14 +178,14 @@ class IsolatedMaker:
         self.is_pattern = bool(about["is_pattern"])
 
     def __call__(self, rig: Rig, **parameters: object) -> Policy:
-        """The policy for a rig."""
+        """Return the policy for a rig."""
         name = self._process.name
         number = self._process.ask(_make, name, self._load, rig, parameters)
         return IsolatedPolicy(self._process, rig, self._process.read(int, number))
 
 
 class IsolatedPolicy(Policy):
-    """The policy that its process knows by a `number`."""
+    """A policy that its process holds under a `number`."""
 
     def __init__(self, process: PolicyProcess, rig: Rig, number: int):
         super().__init__(rig)
@@ -198,11 +198,11 @@ class IsolatedPolicy(Policy):
         self._process.ask(_reset, self._number)
 
     def demand(self, belief: Belief) -> Demand:
-        """Raise InvalidInput: the process takes observations alone."""
+        """Raise InvalidInput: the process takes only observations."""
         raise InvalidInput("a policy in a process of its own is called with an observation")
 
     def __call__(self, observation: Observation) -> Action:
-        """The action for an observation, as the process answers."""
+        """Return the action for an observation, computed in the process."""
         answer = self._process.ask(_act, self._number, dict(observation))
         action: Action
         action, self.demanded = self._process.read(self._read, answer)
@@ -214,7 +214,7 @@ class IsolatedPolicy(Policy):
         if file.tell() == len(answer):
             return action, None
         cells, sizes = (np.load(file, allow_pickle=False).astype(np.int64) for _ in range(2))
-        # Compiled code follows these numbers without a look at the bounds.
+        # Compiled code uses these numbers without a check of bounds.
         in_grid = 0 <= cells.min(initial=0) <= cells.max(initial=0) < self.rig.grid.size
         if not in_grid or sizes.min(initial=0) < 0 or sizes.sum() != cells.size:
             raise ValueError("its sets are of other cells than the grid has")
@@ -227,7 +227,7 @@ _NUMBERS = count()
 
 
 def _serve(connection: Connection) -> None:
-    """Run what is asked for, until the process at the other end is gone."""
+    """Run requested functions until the process at the other end is gone."""
     end_with_parent()
     lead_group()
     while True:
@@ -253,7 +253,7 @@ def _answer(request: bytes) -> bytes:
         return b"-" + json.dumps([kind, told]).encode()
 
 
-def _told_error(answer: bytes) -> Exception:
+def _rebuild_error(answer: bytes) -> Exception:
     kind, told = json.loads(answer)
     return _ERRORS.get(str(kind), InvalidInput)(shortened(one_line(str(told)), LONGEST))
 

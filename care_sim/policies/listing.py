@@ -1,4 +1,4 @@
-"""The policies as people read them: name, tags, what it does, parameters, source."""
+"""Readable descriptions of policies: name, tags, summary, parameters, source."""
 
 import inspect
 from collections.abc import Iterator
@@ -14,7 +14,9 @@ TEXT_WIDTH = 80
 
 
 def policy_paragraphs() -> Iterator[str]:
-    """One paragraph per policy, then the entries that another policy of the same name hides."""
+    """Return one paragraph per policy, then the entries that another policy of the same name
+    hides.
+    """
     for name in policy_names():
         yield _paragraph(name)
     for entry, winner in POLICIES.hidden_entries():
@@ -22,7 +24,7 @@ def policy_paragraphs() -> Iterator[str]:
 
 
 def parameter_texts(make: PolicyMaker) -> list[str]:
-    """The parameters as NAME=DEFAULT; a bare name must be given."""
+    """Return the parameters as NAME=DEFAULT; a bare name is required."""
     return [
         parameter.name
         if parameter.default is parameter.empty
@@ -47,8 +49,8 @@ def _paragraph(name: str) -> str:
 
 
 def _summary(name: str, make: PolicyMaker) -> str:
-    """For a built-in policy the paragraph that its docstring begins with. For another one the first
-    line of it, and its package.
+    """Return a built-in policy's first paragraph of its docstring. For another policy, return its
+    first line and its package.
     """
     if name in BUILT_IN:
         return (inspect.getdoc(make) or "").partition("\n\n")[0]

@@ -1,7 +1,7 @@
 """Makers of policies: a `Policy` subclass, or another callable that takes a `Rig` and parameters.
 
-The functions here tell which of its arguments a user may set and which come from the environment,
-and what is wrong with an entry of the group `care_sim.policies` that makes no policy.
+The functions here separate arguments that a user may set from those of the environment. They also
+report what is wrong with an entry of the group `care_sim.policies`.
 """
 
 import inspect
@@ -18,12 +18,12 @@ PolicyMaker: TypeAlias = Callable[..., Policy]
 
 
 def is_privileged(make: PolicyMaker) -> bool:
-    """Whether truth is handed to it, after the rig."""
+    """Return True if the policy gets truth, after the rig."""
     return inspect.isclass(make) and issubclass(make, PrivilegedPolicy)
 
 
 def settable(make: PolicyMaker) -> list[inspect.Parameter]:
-    """The parameters that follow the rig and, for a privileged policy, the truth."""
+    """Return the parameters after the rig and, for a privileged policy, the truth."""
     return list(inspect.signature(make).parameters.values())[_given(make) :]
 
 
@@ -31,7 +31,7 @@ def check_parameters(name: str, make: PolicyMaker, parameters: Mapping[str, obje
     """Raise InvalidInput for a parameter that the policy does not have or that is not the user's to
     set.
     """
-    # Those in front come from the environment and from nowhere else.
+    # The first arguments come only from the environment.
     for given in list(inspect.signature(make).parameters)[: _given(make)]:
         if given in parameters:
             raise InvalidInput(
@@ -48,8 +48,8 @@ def check_parameters(name: str, make: PolicyMaker, parameters: Mapping[str, obje
 def made(
     name: str, make: PolicyMaker, given: Sequence[object], parameters: Mapping[str, object]
 ) -> Policy:
-    """Return the policy that `make` makes. Raises BrokenPolicy for what is no policy."""
-    # Any other error of somebody's code is a fault of the policy, and is named as one.
+    """Return the policy that `make` makes. Raises BrokenPolicy for anything else."""
+    # Any other error of foreign code is a fault of the policy, and is reported as one.
     try:
         policy = make(*given, **parameters)
     except (KeyboardInterrupt, InvalidInput, MissingExtra):
@@ -74,12 +74,16 @@ def tags_of_maker(make: PolicyMaker) -> tuple[str, ...]:
 
 
 def _given(make: PolicyMaker) -> int:
-    """How many arguments come from the environment: rig, and truth for a privileged one."""
+    """Return the number of arguments from the environment: the rig, and truth for a privileged
+    policy.
+    """
     return 2 if is_privileged(make) else 1
 
 
 def policy_faults(made: Any) -> Iterator[str]:
-    """Why a loaded object makes no policy, one text per reason. `care_sim.base.plugins` asks it."""
+    """Return why a loaded object makes no policy, one text per reason, for
+    `care_sim.base.plugins`.
+    """
     if not callable(made) or (inspect.isclass(made) and not issubclass(made, Policy)):
         yield "is no Policy"
     yield from class_faults(made)

@@ -1,8 +1,8 @@
-"""One policy for all worlds of a vector environment: what each would ask for alone, in one call.
+"""One policy for all worlds of a vector environment: the same actions as one policy per world, in
+one call.
 
-An idea that goes by rows is asked once for the rows of all worlds, and one that never changes once
-for all keyframes. Of any other there is a policy for every world. Worlds whose rigs
-differ, as in their budgets, are asked together with those of equal rigs.
+A row policy computes the rows of all worlds at once, a fixed policy all keyframes at once. Any
+other policy has an instance per world. Worlds are grouped by rig.
 """
 
 from abc import ABC, abstractmethod
@@ -27,8 +27,8 @@ Actions = NDArray[np.float32]
 
 
 class VectorPolicy(ABC):
-    """A policy of `worlds` worlds with the same `rig`. To call it is to ask for an action of each,
-    once a keyframe.
+    """A policy of `worlds` worlds with the same `rig`. A call returns an action per world, once per
+    keyframe.
     """
 
     def __init__(self, rig: Rig, worlds: int):
@@ -36,17 +36,18 @@ class VectorPolicy(ABC):
         self.worlds = worlds
 
     def reset(self, mask: Mask | None = None) -> None:
-        """Forget the episodes of the worlds in the mask (W,), of all without one; called before
-        each begins. Raises InvalidInput for another mask.
+        """Forget the episodes of the worlds in the mask (W,), by default of all; called before each
+        begins. Raises InvalidInput for another mask.
         """
         self._forget(self._mask("mask", mask))
 
     def __call__(self, observation: Observation, live: Mask | None = None) -> Actions:
-        """The actions (W, E, A) for the observation of a vector environment, of each world what
-        its policy asks for alone. They are read-only, and the next call overwrites them. Of worlds
-        that are not `live` (W,) nothing is read or remembered, and their actions mean nothing.
+        """Return the actions (W, E, A) for the observation of a vector environment, for each world
+        those of its policy alone. They are read-only, and the next call overwrites them. Worlds
+        that are not `live` (W,) are neither read nor remembered, and their actions are undefined.
 
-        Raises InvalidInput for what is no observation of its rig and worlds, and for another mask.
+        Raises InvalidInput for an observation that does not fit its rig and worlds, and for another
+        mask.
         """
         wanted = self._mask("live", live)
         check_observed(observation, self.rig, self.worlds)
@@ -56,7 +57,7 @@ class VectorPolicy(ABC):
 
     @abstractmethod
     def _actions(self, observation: Observation, live: Mask) -> Actions:
-        """The actions; what is made of the array is read-only."""
+        """Return the actions; the caller makes the array read-only."""
 
     @abstractmethod
     def _forget(self, mask: Mask) -> None:
@@ -72,7 +73,7 @@ class VectorPolicy(ABC):
 
 
 def vector_policy(make: Callable[[], Policy], worlds: int) -> VectorPolicy:
-    """Return what plays so many worlds, each as a policy that `make` makes would play it alone."""
+    """Return the vector policy of this many worlds, each played as by a single policy of `make`."""
     first = make()
     if isinstance(first, RowPolicy) and _asks_as(first, RowPolicy):
         return _ByRows(first, worlds)
@@ -82,8 +83,8 @@ def vector_policy(make: Callable[[], Policy], worlds: int) -> VectorPolicy:
 
 
 def _asks_as(policy: Policy, kind: Any) -> bool:
-    """Whether a policy of a kind has its idea where the kind has it alone, and no memory: somebody
-    may have changed it elsewhere.
+    """Return True if a policy overrides only its kind's own method and has no memory: foreign code
+    may override others.
     """
     asked = ("__call__", "_cells", "demand", "remember", "reset")
     return all(
@@ -93,7 +94,7 @@ def _asks_as(policy: Policy, kind: Any) -> bool:
 
 
 class _ByRows(VectorPolicy):
-    """All worlds by the rows of all."""
+    """All worlds at once, by the rows of all."""
 
     def __init__(self, policy: RowPolicy, worlds: int):
         super().__init__(policy.rig, worlds)
@@ -110,10 +111,10 @@ class _ByRows(VectorPolicy):
         return self._allocator.scores(stages, beliefs.budgets)
 
     def _check(self, stage: WorldSets) -> None:
-        """Raise InvalidInput for sets that compiled code would follow out of its tables."""
+        """Raise InvalidInput for sets with cells outside the tables of compiled code."""
         sets, counts = stage
         name, cells = self._policy.name or type(self._policy).__name__, self.rig.grid.size
-        # One look at all: as numbers without a sign, those below 0 are the largest.
+        # One comparison covers both bounds: as unsigned numbers, those below 0 are the largest.
         if sets.cells.view(np.uint64).max(initial=0) >= cells:
             raise InvalidInput(f"policy {name}: cells must lie in 0..{cells - 1}")
         if counts.shape != (self.worlds,) or counts.sum() != len(sets):
@@ -127,7 +128,7 @@ class _ByRows(VectorPolicy):
 
 
 class _Fixed(VectorPolicy):
-    """The same action in all worlds at all keyframes, made once for every budget that is told."""
+    """The same action in all worlds at all keyframes, made once per budget."""
 
     def __init__(self, policy: FixedPolicy, worlds: int):
         super().__init__(policy.rig, worlds)
@@ -147,7 +148,7 @@ class _Fixed(VectorPolicy):
 
 
 class _OneEach(VectorPolicy):
-    """A policy of its own for every world."""
+    """One policy per world."""
 
     def __init__(self, policies: Sequence[Policy]):
         super().__init__(policies[0].rig, len(policies))
@@ -157,7 +158,7 @@ class _OneEach(VectorPolicy):
     def _actions(self, observation: Observation, live: Mask) -> Actions:
         for world in np.flatnonzero(live).tolist():
             action: Action = self._policies[world](_world(observation, world))
-            # One of another shape would be spread over all cells.
+            # An action of another shape would be broadcast over all cells.
             if np.shape(action) != self.rig.grid.shape:
                 raise InvalidInput(
                     f"action must have shape {self.rig.grid.shape} (rows, columns), "
@@ -172,13 +173,13 @@ class _OneEach(VectorPolicy):
 
 
 def _world(observation: Observation, world: int) -> Observation:
-    """The observation of one world."""
+    """Return the observation of one world."""
     return {name: tables[world] for name, tables in observation.items()}
 
 
 def policy_of_rigs(makers: Sequence[Callable[[], Policy]], rigs: Sequence[Rig]) -> VectorPolicy:
-    """Return what plays W worlds, each as the policy that its one of the `makers` (W,) makes for
-    its one of the `rigs` (W,) would play it alone.
+    """Return the vector policy of W worlds, each played as by the policy of its `makers` (W,) entry
+    for its `rigs` (W,) entry.
     """
     groups: list[list[int]] = []
     for world, rig in enumerate(rigs):
@@ -192,8 +193,8 @@ def policy_of_rigs(makers: Sequence[Callable[[], Policy]], rigs: Sequence[Rig]) 
 
 
 class _ByRig(VectorPolicy):
-    """Worlds by rig: the worlds at each of the `places` have one of the `policies`; `rig` is that
-    of the first.
+    """Worlds grouped by rig: the worlds at each of the `places` have one of the `policies`; `rig`
+    is that of the first.
     """
 
     def __init__(self, policies: Sequence[VectorPolicy], places: Sequence[Integers]):

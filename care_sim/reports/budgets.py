@@ -1,4 +1,4 @@
-"""The tables of B90: how few cells each entry needs, and which count holds it back."""
+"""Tables of B90: how few cells each entry needs, and the count that limits it."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""The tables of what detectors make of scans."""
+"""Tables of detectors on scans."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -29,8 +29,8 @@ _NOTES = (
 
 
 def detector_tables(judged: Judged, least_scores: Sequence[float], against: str) -> list[Table]:
-    """Return tables of what every detector finds and how much of it is right, from each of the
-    `least_scores` on and where it is as precise as all that the detector `against` reports; then
+    """Return tables of every detector's recall and precision, from each of the `least_scores` on.
+    Also at the score where a detector is as precise as all reports of the detector `against`; then
     class by class.
     """
     boxes = {name: [scene.boxes for scene in scenes] for name, scenes in judged.items()}
@@ -38,7 +38,7 @@ def detector_tables(judged: Judged, least_scores: Sequence[float], against: str)
 
 
 def has_scores(scenes: Sequence[SceneBoxes]) -> bool:
-    """Whether the detector of these boxes tells how sure it is: not all have the score 1."""
+    """Return True if the detector of these boxes has scores: not all are 1."""
     return any((scene.scores != 1).any() for scene in scenes)
 
 
@@ -118,7 +118,7 @@ def _shares(found: Counts, scans: int) -> Iterator[str]:
 
 
 def _ahead(ours: Counts, theirs: Counts) -> Iterator[str]:
-    """By how much more is found, of first sightings and of all."""
+    """Return how much more is detected, of first sightings and of all."""
     yield _difference(ours.sighted - theirs.sighted, ours.events)
     yield _difference(ours.found - theirs.found, ours.frames)
 

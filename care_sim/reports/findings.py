@@ -1,5 +1,5 @@
-"""Findings of a study in short: the best policy against the best control at every budget of either
-loop, the table of levels that ends a study on a terminal, and the sentences after its tables.
+"""Short findings of a study: the best policy against the best control at every budget of either
+loop. Also the table of levels that ends a study on a terminal, and the sentences after its tables.
 """
 
 from collections.abc import Sequence
@@ -54,7 +54,7 @@ class Lead:
 
     @property
     def sign(self) -> int:
-        """1 where the first is ahead, -1 where the second is, 0 where they are tied."""
+        """1 if the first is ahead, -1 if the second is, 0 if they tie."""
         return self.difference.sign if self.difference else 0
 
     @property
@@ -70,11 +70,11 @@ class Lead:
 
 
 def leads(rows: Sequence[Row], plain: bool = False) -> list[Lead]:
-    """The best policy over the best control at every budget of every setting, or of the `plain`
-    ones: in first sightings, or in first detections and, where there are any, in collisions.
+    """Return the lead of the best policy over the best control at every budget of every setting, or
+    of the `plain` ones. Measures are first sightings, or first detections and, if any, collisions.
 
-    The best are chosen among policies that a car can have, by the seeds or scenes that all of
-    them have. Their difference is over those that the two share.
+    The best are chosen among policies that a car can have, by the seeds or scenes that all of them
+    have. Their difference is over the seeds or scenes that both have.
     """
     is_open = loop_of(rows) is OPEN_LOOP
     found = (

@@ -1,8 +1,8 @@
 """Several folders of one study as one: rows side by side, so that tables compare them pair by pair.
 
-What one person plays today then stands beside what was published, which need not be played again.
-Rows of one task that came out alike are one row. Where they came out differently, something else
-has changed than the policy, and nothing of the two folders may be compared.
+New plays then stand beside published ones, which need not be played again. Equal rows of one task
+become one row. If they differ, something other than the policy has changed, and the two folders may
+not be compared.
 """
 
 import json
@@ -35,9 +35,9 @@ _EVENTS = "events.parquet"
 
 @dataclass(frozen=True)
 class Merged:
-    """Rows of several folders. `twice` is how many tasks more than one of them held; `apart` are
-    folders of which nothing shows that their worlds are those of the first: neither the code that
-    played them, nor a task or a film in common.
+    """Rows of several folders. `twice` counts the tasks that more than one folder holds. `apart`
+    are folders whose worlds may differ from the first's: they share neither code, nor a task or a
+    film.
     """
 
     study: Study
@@ -80,9 +80,8 @@ class Merged:
 def merged(folders: Sequence[Path]) -> Merged:
     """Return the rows of several folders together, in their order.
 
-    Raises InvalidInput as `read_results` does; for folders of different studies; where one task
-    came out differently in two of them, or one scene has two films; and for columns that cannot be
-    one, since their types differ.
+    Raises InvalidInput as `read_results` does, and for folders of different studies. Also raises it
+    if a task differs between two folders, a scene has two films, or columns have different types.
     """
     study = read_results(folders[0])[1]
     for folder in folders[1:]:
@@ -188,7 +187,7 @@ def _descriptions(folders: Sequence[Path]) -> dict[str, dict[str, Any]]:
     told: dict[str, dict[str, Any]] = {}
     for folder in folders:
         name = folder.resolve().name
-        # Two folders of one name in different places are told apart by their turn.
+        # Folders with the same name are numbered.
         while name in told:
             name += "'"
         told[name] = described(folder)

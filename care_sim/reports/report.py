@@ -14,7 +14,7 @@ from care_sim.base.files import json_content, write_text
 from care_sim.reports.studies import STUDIES, SWEEP, study_of
 from care_sim.reports.study import Study
 from care_sim.reports.table import Bold, Table, TableRow, unmarked
-from care_sim.study.journal import UNFINISHED, how_far
+from care_sim.study.journal import UNFINISHED, describe_progress
 from care_sim.study.results_formats import results_format_in
 from care_sim.study.rows.checks import RowChecks
 from care_sim.study.rows.parquet import read_notes, read_rows, read_table
@@ -110,7 +110,7 @@ def read_results(folder: Path) -> tuple[list[Row], Study, list[str]]:
     """
     kind = results_format_in(folder)
     # Rows are written when a study ends. A journal without them is of a study that was stopped.
-    if not (folder / kind.file).is_file() and (told := how_far(folder)):
+    if not (folder / kind.file).is_file() and (told := describe_progress(folder)):
         raise InvalidInput(told)
     path = folder / kind.file
     study = study_of(path)
@@ -247,7 +247,11 @@ def next_steps(folder: Path, study: Study, rows: Sequence[Row] = ()) -> list[str
     beside = f" and {counted(len(figures), 'figure')}" if figures else ""
     report = shlex.join(["care-sim", "report", str(folder)])
     return [
-        *([f"Not all of it: {how_far(folder)}"] if (folder / UNFINISHED).is_file() else []),
+        *(
+            [f"Not all of it: {describe_progress(folder)}"]
+            if (folder / UNFINISHED).is_file()
+            else []
+        ),
         f"Results are in {folder}: {TABLES}{beside}",
         "Next:",
         f"  {report} --verbose",

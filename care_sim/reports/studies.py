@@ -1,4 +1,4 @@
-"""The studies by name: what is shown of their rows."""
+"""The studies by name, with the reports of their rows."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -279,7 +279,7 @@ def study_of(path: Path) -> Study:
 
     Raises InvalidInput for the name of a study that this version does not know.
     """
-    # Files of before the name was written hold sweeps.
+    # Older files without a name hold sweeps.
     name = read_notes(path)[0] or SWEEP.name
     if name not in STUDIES:
         raise unknown(f"study in {path}", name, STUDIES)

@@ -1,4 +1,4 @@
-"""A study as it is shown: its tables and figures, the sentences after them, the columns read."""
+"""The report of a study: its tables and figures, closing sentences, and the columns read."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Study:
-    """How the rows of a study are shown; all functions are pure functions of the rows.
+    """The report of a study; all functions are pure functions of its rows.
 
     `title` names it to readers. `closing` are sentences after the tables. `figure_names` are all
     figures that the study can draw, as patterns in which {world} stands for a scenario or source,
@@ -42,7 +42,7 @@ class Study:
         """The figures that it can draw of the built-in worlds and those of the rows, as patterns in
         which a * stands for any text.
         """
-        # Names of figures are told apart by worlds: what a user draws beside them is not ours.
+        # Names of figures contain worlds, so that a user's own figures are not removed.
         own = [Setting(setting_of(row).world).slug for row in rows]
         worlds = dict.fromkeys([*SCENARIOS, *SOURCES, *own])
         return [

@@ -15,7 +15,9 @@ from care_sim.base.errors import printable
 
 TableRow = tuple[str, ...]
 _MARKDOWN = re.compile(r"[\\`*|~]|(?<!\w)_|_(?!\w)|<(?=[A-Za-z/!?])|&(?=#?\w+;)|(?<=\])\(")
-"""What Markdown reads as marks, tags, entities or links. An underscore within a word is none."""
+"""Characters that Markdown reads as marks, tags, entities or links. An underscore within a word is
+none.
+"""
 _NUMBER = r"[≤≥~]?[+-]\d[\d.]*"
 _DIFFERENCE = re.compile(rf"{_NUMBER}\*?°?( .*)?")
 _MARKS = {

@@ -23,11 +23,13 @@ from care_sim.sensors.pictures import FRONT_CAMERA
 from care_sim.streets.layouts import LANE_WIDTH_M, PARKING_WIDTH_M, SPEED_LIMIT_MPS
 from care_sim.world.bodies import CATALOGUE, BodyKind
 from care_sim.world.traffic import RoadVehicle, Traffic
-from care_sim.world.world import Actor, Motion, Reflection, World, on_the_other_side
+from care_sim.world.world import Actor, Motion, Reflection, World, reflect_pose
 
 
 def scenario_faults(made: Any) -> Iterator[str]:
-    """Why a loaded object is no scenario, one text per reason. `care_sim.base.plugins` asks it."""
+    """Return why a loaded object is no scenario, one text per reason, for
+    `care_sim.base.plugins`.
+    """
     if not (inspect.isclass(made) and issubclass(made, Scenario)):
         yield "is no Scenario"
         return
@@ -38,14 +40,14 @@ def scenario_faults(made: Any) -> Iterator[str]:
 
 
 LONGEST_EPISODE_S = 60.0
-"""The longest episode: a car at 60 km/h then comes to the end of the road, and a delayed picture is
-as old as an observation can say.
+"""The longest episode: a car at 60 km/h then reaches the end of the road, and the age of a delayed
+picture reaches its bound in observations.
 """
 EGO_SPEED_BOUNDS_MPS = (0.5, 60.0)
 """Bounds of the ego's speed: from a walk to far beyond any street's traffic."""
 
 NO_LIMIT_MPS = 2 * SPEED_LIMIT_MPS
-"""The limit of lanes whose drivers keep the ego's speed: one below that would slow them."""
+"""Speed limit of lanes whose drivers keep the ego's speed: a lower one would slow them."""
 USUAL_EGO_SPEED_MPS = (SPEED_LIMIT_MPS - 0.3, SPEED_LIMIT_MPS + 0.3)
 """30 km/h, give or take the 1 km/h by which a driver's speed varies."""
 RIGHT_PARKING_Y = -(LANE_WIDTH_M + PARKING_WIDTH_M) / 2
@@ -61,7 +63,7 @@ class Scenario(ABC):
     """The physics of a scenario: numbers, and ranges within which a seeded generator draws."""
 
     cameras: ClassVar[tuple[PinholeCamera, ...]] = (FRONT_CAMERA,)
-    """What the car has."""
+    """The car's sensor set-up, controller and driver."""
     duration_s: float = bounded(6.0, 0.05, LONGEST_EPISODE_S)
     """Longest duration of an episode."""
 
@@ -80,7 +82,7 @@ class Scenario(ABC):
         try:
             world = self.build(rng)
         except InvalidInput as error:
-            # What its code asks of ours in a wrong way is a fault of it.
+            # Wrong calls of our code are faults of the scenario.
             if (place := foreign_place(error)) and not is_raised_by_foreign(error):
                 raise BrokenScenario(f"{own} cannot be built: {error}{place}") from error
             raise
@@ -129,7 +131,7 @@ class MirrorableScenario(Scenario):
 
     def empty_world(self, traffic: Traffic, ego_speed: float, rng: np.random.Generator) -> World:
         """The world to be filled, at time zero; `ego_speed` in m/s."""
-        # A stream of its own: the draws that follow are those of the world that is not reflected.
+        # A separate stream: later draws equal those of the world without reflection.
         reflects = self.mirrored == "always" or (
             self.mirrored == "drawn" and rng.spawn(1)[0].random() < 0.5
         )
@@ -155,5 +157,5 @@ class MirroredWorld(World):
         backdrop: bool = False,
     ) -> Actor:
         """Add a body where `World.add` would put its reflection."""
-        reflected = on_the_other_side(pose) if isinstance(pose, tuple) else Reflection(pose)
+        reflected = reflect_pose(pose) if isinstance(pose, tuple) else Reflection(pose)
         return super().add(name, kind, reflected, reported=reported, backdrop=backdrop)

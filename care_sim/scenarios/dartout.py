@@ -133,24 +133,19 @@ class Dartout(CrossingScenario):
         """Leave the street empty."""
 
 
-# The dense street.
-#
-# The reckoning, from geometry and the shares of Algorithm 1 alone (full scan, perfect tracks, at
-# the keyframe the person first returns three rays): eight tracked hulls compete for the
-# exploitation share round-robin, six wedges for the reserve. The person's wedge is about 54 cells.
-# Of those a reserve for every camera box fires, on average over seeds 0-7, 24 at 3%, 34 at 3.5%, 45
-# at 4% and all 54 at 5%. Wedges fill from the top row down; the camera stands below the LiDAR, so
-# that the first three rows of the wedge pass over the person's head, and three hits need four rows,
-# about 32 cells. So at 3% (where six wedges share 148 cells) the all-camera reserve must be late,
-# and from 4% on the two reserves agree.
-#
-# Two choices of the street carry this. The rows go on beside the ego, where the LiDAR sees them and
-# the camera does not: their hulls are large and take their turns. And neither the ego's lane nor
-# the right kerb beyond the person's line holds a vehicle: a person in front of a tracked vehicle
-# lies inside its hull, where every policy fires, and would be no first sighting to tell policies
-# apart.
-#
-# docs/environments/dense.md says how this layout was chosen.
+# The dense street. The computation, from geometry and the shares of Algorithm 1 alone (full scan,
+# perfect tracks, at the keyframe the person first returns three rays): eight tracked hulls compete
+# for the exploitation share round-robin, six wedges for the reserve. The person's wedge is about 54
+# cells. A reserve for every camera box fires 24 of them at 3%, 34 at 3.5%, 45 at 4% and all 54 at
+# 5%, on average over seeds 0-7. Wedges fill from the top row down; the camera stands below the
+# LiDAR, so that the first three rows of the wedge pass over the person's head, and three hits need
+# four rows, about 32 cells. So at 3% (where six wedges share 148 cells) the all-camera reserve must
+# be late, and from 4% on the two reserves agree. Two choices of the street carry this. The rows go
+# on beside the ego, where the LiDAR sees them and the camera does not: their hulls are large and
+# take their turns. And neither the ego's lane nor the right kerb beyond the person's line holds a
+# vehicle: a person in front of a tracked vehicle lies inside its hull, where every policy fires,
+# and would be no first sighting to tell policies apart. docs/environments/dense.md says how this
+# layout was chosen.
 
 DOUBLE_PARKED_Y = LANE_WIDTH_M
 KERBS = {"left": LEFT_PARKING_Y, "right": RIGHT_PARKING_Y, "oncoming": DOUBLE_PARKED_Y}

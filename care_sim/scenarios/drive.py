@@ -30,9 +30,9 @@ from care_sim.world.traffic import Traffic
 from care_sim.world.world import WORLD_STEP_S, Motion, World
 
 CLEAR_M = 0.5
-"""Who sets off expects to keep at least this much from other traffic."""
+"""Least expected distance from other traffic when a comer sets off."""
 LOOK_AHEAD_STEP_S = 0.1
-"""Between two times at which they look whether they will."""
+"""Time between two such checks."""
 
 
 SIDES = {"left": 1, "right": -1}
@@ -75,8 +75,7 @@ class DriveScenario(Scenario):
         side = None if self.side is None else SIDES[self.side]
         wanted = Wanted(self.encounters, side, self.who, self.occluder_reported)
         drive = draw_drive(rng, self.duration_s, wanted, self.turn_chance)
-        # Nobody drives on highway-env's straight road; the lanes of the street have their own
-        # flows.
+        # highway-env's straight road stays empty; the lanes of the street have their own flows.
         nobody = Traffic((1,), ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=SPEED_LIMIT_MPS)
         world = World(nobody, drive.plan.cruise_mps, drive.plan.route)
         world.goal_m = drive.goal_m
@@ -89,7 +88,7 @@ class DriveScenario(Scenario):
 
 
 def _flowing(drive: Drive, lane: DrivenLane) -> FlowingLane:
-    """A lane with its drivers, and where the ego is in it."""
+    """Return a lane with its drivers, and the ego's part in it."""
     flow = LaneFlow(lane.places, lane.speeds)
     # The ego's own lanes are those along its roads whose middle is its route. While it turns, it is
     # in both: its tail is in the way of who follows until the turn ends.
@@ -102,7 +101,7 @@ def _flowing(drive: Drive, lane: DrivenLane) -> FlowingLane:
 
 
 def _add_bodies(world: World, drive: Drive) -> None:
-    """Everything that stands or walks on its own."""
+    """Add everything that stands or walks on its own."""
     for kind, way in zip(drive.kinds, drive.ways, strict=True):
         stands = bool((way == way[0]).all())
         x, y, heading = way[0].tolist()
@@ -181,19 +180,21 @@ def _add_encounters(world: World, drive: Drive, traffic: StreetTraffic) -> None:
 
 def _crossing(crosser: Crosser, one: Encounter, lane: DrivenLane) -> Crossing:
     """The way of a crosser over a lane of the road that it crosses at a right angle."""
-    # In the lane is whoever reaches into it: not who stops before its edge.
+    # A crosser is in the lane if it reaches into it, not if it stops before its edge.
     to_middle = one.side * (one.from_d - lane.d)
     reach = (LANE_WIDTH_M + CATALOGUE[one.who].size[0]) / 2
     return Crossing(crosser, lane.direction * one.s, to_middle - reach, to_middle + reach)
 
 
 def _look(crosser: Crosser, plan: SpeedPlan, line_m: float, world: World) -> None:
-    """Let somebody watch the ego, whose middle is on the line `line_m` along the route."""
+    """Let a crosser watch the ego, whose middle is on the line at `line_m` along the route."""
     crosser.look(world.time, lambda: _seconds_left(world, plan, line_m))
 
 
 def _seconds_left(world: World, plan: SpeedPlan, line_m: float) -> float:
-    """The ego's time until its middle is `line_m` along the route, if it goes on as it does."""
+    """Return the ego's time until its middle is `line_m` along the route, if it continues as
+    now.
+    """
     gaining = max(world.ego_motion.acceleration, 0.0)
     return plan.seconds_to(world.along_m, line_m, world.ego.speed, gaining)
 
@@ -201,7 +202,7 @@ def _seconds_left(world: World, plan: SpeedPlan, line_m: float) -> float:
 def _may_go(
     drive: Drive, traffic: StreetTraffic, size: tuple[float, float]
 ) -> Callable[[Walk], bool]:
-    """Return the rule by which somebody of a `size` sets off."""
+    """Return the rule by which a crosser of a `size` sets off."""
     lanes = [
         (flowing, np.array([CATALOGUE[kind].size[:2] for kind in lane.kinds]))
         for flowing, lane in zip(traffic.lanes, drive.lanes, strict=True)
@@ -214,7 +215,7 @@ def _may_go(
 def _is_free(
     lanes: Sequence[tuple[FlowingLane, Floats]], size: tuple[float, float], walk: Walk
 ) -> bool:
-    """Whether somebody of a `size` keeps clear of all traffic, should nobody brake for them."""
+    """Return True if a crosser of a `size` keeps clear of all traffic, without braking drivers."""
     times = np.arange(0.0, walk.duration_to(walk.length_m), LOOK_AHEAD_STEP_S)
     own = np.array([walk.pose(walk.starts_s + time) for time in times.tolist()])
     return not any(_meet(lane, sizes, times, own, size) for lane, sizes in lanes)
@@ -223,7 +224,9 @@ def _is_free(
 def _meet(
     lane: FlowingLane, sizes: Floats, times: Floats, own: Floats, size: tuple[float, float]
 ) -> bool:
-    """Whether vehicles of `sizes` (n, 2) come close to `own` poses (t, 3) at `times` (t,)."""
+    """Return True if vehicles of `sizes` (n, 2) come close to `own` poses (t, 3) at `times`
+    (t,).
+    """
     places = lane.foreseen(len(times), LOOK_AHEAD_STEP_S)
     poses = lane.poses_at(places.ravel())
     count = len(sizes)

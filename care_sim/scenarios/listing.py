@@ -1,4 +1,4 @@
-"""The scenarios as people read them: name, what it is, parameters with their bounds."""
+"""Readable descriptions of scenarios: name, summary, parameters with their bounds."""
 
 from collections.abc import Iterator
 from dataclasses import Field, fields
@@ -11,7 +11,7 @@ from care_sim.scenarios import PLUGINS, SCENARIOS, scenario_class, scenario_name
 from care_sim.scenarios.base import Scenario
 
 _ZERO = {"speed_kph": "0 is drawn", "target_kph": "0 is the protocol's"}
-"""What 0 stands for, of parameters in which it is no number."""
+"""Meaning of 0, for parameters in which 0 is no number."""
 
 
 def scenario_lines() -> Iterator[str]:

@@ -1,14 +1,14 @@
 """UN Regulation 157: a slower vehicle changes over from the lane beside into the ego's.
 
-The grid: ego speeds, relative speeds, lateral speeds, kinds and sides, and the limits to their
-combinations, are those of scenario 4.4_1 of the ALKS scenarios that BMW and ASAM published for the
-regulation (github.com/asam-oss/OSC-ALKS-scenarios). Gaps have half their step, 5 m for 10 m, and
-leave out 0.
+The grid follows scenario 4.4_1 of the ALKS scenarios that BMW and ASAM published for the regulation
+(github.com/asam-oss/OSC-ALKS-scenarios). That holds for ego speeds, relative speeds, lateral
+speeds, kinds, sides, and the limits of their combinations. Gaps have half the step, 5 m instead of
+10 m, and leave out 0.
 
-Preventable cases: both vehicles are boxes along the road. The other moves at even speed, along and
-across; the ego keeps its speed until its driver brakes, as `care_sim.driving.drivers` says, and
-then slows down to the other's speed. So the distance between them follows in closed form, and no
-step of time enters.
+Preventable cases: both vehicles are boxes along the road. The other vehicle moves at constant
+speed, along and across. The ego keeps its speed until its driver brakes
+(`care_sim.driving.drivers`), and then slows down to the other's speed. So their distance follows in
+closed form, without time steps.
 """
 
 from collections.abc import Iterable, Sequence
@@ -39,8 +39,8 @@ SIDES = ("left", "right")
 SLOWEST_KPH = 10.0
 """The least speed of the vehicle that cuts in."""
 LONGEST_S = 6.0
-"""The longest time to collision at the begin of a lane change. The slowest one takes 3.3 s until a
-car is in the way: longer approaches end as any to a car ahead.
+"""Longest time to collision at the beginning of a lane change. The slowest change takes 3.3 s until
+the car is in the way: longer approaches are as to any car ahead.
 """
 
 
@@ -51,16 +51,16 @@ class CutInCase:
     ego_kph: float
     """V_e0, of the ego."""
     relative_kph: float
-    """V_e0 - V_o0: by how much the other is slower."""
+    """V_e0 - V_o0: the other's lag in speed."""
     gap_m: float
     """dx_0, from the ego's front to the other's rear when the other leaves the middle of its lane.
     """
     lateral_mps: float
     """V_y, of the other."""
     kind: str = "car"
-    """What it is: one of `KINDS`."""
+    """Kind of the other vehicle: one of `KINDS`."""
     side: str = "right"
-    """Where it comes from: one of `SIDES`."""
+    """Side that it comes from: one of `SIDES`."""
 
     @property
     def length_m(self) -> float:
@@ -79,7 +79,7 @@ class CutInCase:
 
     @property
     def possible(self) -> bool:
-        """Whether the other is no slower than `SLOWEST_KPH`, faster along than across, and would be
+        """True if the other is at least as fast as `SLOWEST_KPH`, faster along than across, and
         reached within `LONGEST_S`.
         """
         return (
@@ -123,7 +123,7 @@ _EGO_LENGTH_M, _EGO_WIDTH_M, _ = CATALOGUE["ego"].size
 
 
 def verdicts(cases: Sequence[CutInCase]) -> list[str]:
-    """For every case `HARMLESS`, `PREVENTABLE` or `UNPREVENTABLE`."""
+    """Return `HARMLESS`, `PREVENTABLE` or `UNPREVENTABLE` for every case."""
     human = HUMAN_MODEL
     gap = np.array([case.gap_m for case in cases])
     closing = np.array([case.relative_kph * KPH for case in cases])
@@ -146,7 +146,7 @@ def verdicts(cases: Sequence[CutInCase]) -> list[str]:
 
 
 def preventable(cases: Sequence[CutInCase]) -> list[CutInCase]:
-    """Return the cases that are preventable: they are scored."""
+    """Return the preventable cases, which are scored."""
     marked = zip(cases, verdicts(cases), strict=True)
     return [case for case, verdict in marked if verdict == PREVENTABLE]
 

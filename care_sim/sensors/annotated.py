@@ -1,7 +1,6 @@
-"""What sensors measure of a scene that somebody annotated, with the object behind each return and
-each box.
+"""Sensor measurements of an annotated scene, with the object behind each return and each box.
 
-The objects are truth: for the scoring and privileged policies.
+The objects are truth: only scoring and privileged policies may read them.
 """
 
 from collections.abc import Sequence
@@ -16,14 +15,14 @@ from care_sim.core.grid import Cells
 from care_sim.core.types import ImageDetections, Scan
 
 NO_OBJECT = -1
-"""The object behind a return or a camera box that lies on no annotated object."""
+"""Object number of a return or camera box that lies on no annotated object."""
 
 
 @dataclass(frozen=True)
 class Annotations:
-    """The annotated objects of a keyframe: `objects` (n,) numbers that hold for the whole film,
-    `classes` (n,) into `care_sim.core.types.CLASSES`, `boxes` (n, 7) in the sensor frame. All
-    ranges; the scoring chooses.
+    """The annotated objects of a keyframe. `objects` (n,) are numbers that stay the same through
+    the film. `classes` (n,) index `care_sim.core.types.CLASSES`. `boxes` (n, 7) are in the sensor
+    frame. All ranges are kept: the scoring selects.
     """
 
     objects: Integers
@@ -34,7 +33,7 @@ class Annotations:
         return len(self.objects)
 
     def take(self, rows: Integers | Mask) -> "Annotations":
-        """Some of the rows, by index or mask."""
+        """Return the rows chosen by index or mask."""
         return Annotations(self.objects[rows], self.classes[rows], self.boxes[rows])
 
 
@@ -42,9 +41,9 @@ NO_ANNOTATIONS = Annotations(np.empty(0, np.int64), np.empty(0, np.int64), np.em
 
 
 class SweepPose(NamedTuple):
-    """One of several sweeps: seconds since it was taken, 0 or more, and the (4, 4) matrix that
-    moves points from the sensor's frame then into its frame at the keyframe, as far as the car
-    knows its own motion.
+    """Age and pose of one of several sweeps. The age is in seconds, 0 or more. The (4, 4) matrix
+    moves points from the sensor's frame at the sweep into its frame at the keyframe, by the motion
+    that the car knows.
     """
 
     lag_s: float
@@ -56,18 +55,17 @@ AT_KEYFRAME = SweepPose(0.0, np.eye(4))
 
 @dataclass(frozen=True)
 class Cloud:
-    """Returns: `cells` (P,) ascending (several returns of a recorded sweep may share one), `points`
-    (P, 3) in the sensor frame, `objects` (P,) the annotated object that each lies on or NO_OBJECT,
-    `intensities` (P,), 0 to 1, where pulses have strength (`care_sim.sensors.signal`) or a LiDAR
-    recorded it, and `times` (P,), seconds from the keyframe, where they have their own
-    (`care_sim.sensors.beams`). `shots` (P,) is how often a cell must be fired for each to return;
-    None where once is enough for all. `rings` (P,) number the lasers of a recorded LiDAR. `ranges`
-    (P,) are metres from the LiDAR, in clouds without `points`.
+    """LiDAR returns. `cells` (P,) ascend; several returns of a recorded sweep may share a cell.
+    `points` (P, 3) are in the sensor frame. `objects` (P,) are the annotated object behind each
+    return, or NO_OBJECT. `intensities` (P,), 0 to 1, exist where pulses have strength
+    (`care_sim.sensors.signal`) or a LiDAR recorded them. `times` (P,), seconds from the keyframe,
+    exist where returns have their own (`care_sim.sensors.beams`). `shots` (P,) is how often a cell
+    must be fired for each return; None where one shot is enough for all. `rings` (P,) number the
+    lasers of a recorded LiDAR. `ranges` (P,) are metres from the LiDAR, in clouds without `points`.
 
-    `far` are the returns of a recorded LiDAR from beyond the reach of the grid. A real detector
-    gets them too, since it was trained with them; no ray, no proxy and no score counts them.
-    Of gathered sweeps, `poses` are theirs, the keyframe's first, and `newest` is the keyframe's
-    own sweep.
+    `far` holds a recorded LiDAR's returns from beyond the reach of the grid. Only real detectors
+    get them, since they were trained with them; rays, proxies and scores ignore them. If sweeps are
+    gathered, `poses` are theirs, the keyframe's first, and `newest` is the keyframe's own sweep.
     """
 
     cells: Cells
@@ -86,27 +84,27 @@ class Cloud:
         return len(self.cells)
 
     def to_shots(self, fired: Integers | None = None) -> "Cloud":
-        """The returns of cells that are `fired` (N,) times; once each, unless it is given."""
+        """Return what cells give that are `fired` (N,) times, by default once each."""
         if self.shots is None:
             return self
         return self.take(self.shots <= (1 if fired is None else fired[self.cells]))
 
     @property
     def whole(self) -> "Cloud":
-        """The returns near and far together."""
+        """Return near and far returns as one cloud."""
         return self if self.far is None else joined([replace(self, far=None), self.far])
 
     def of_cells(self, answering: Mask) -> "Cloud":
-        """The returns, near and far, of the cells that are `answering` (N,)."""
+        """Return the returns, near and far, of the `answering` (N,) cells."""
         own = self.take(answering[self.cells])
         return replace(own, far=self.far.take(answering[self.far.cells])) if self.far else own
 
     def take(self, kept: Mask) -> "Cloud":
-        """Some of the returns, by mask (P,); those from far away stay."""
+        """Return the returns in a mask (P,). Far returns stay."""
         return self.ordered(np.flatnonzero(kept))
 
     def ordered(self, rows: Integers) -> "Cloud":
-        """The returns in these rows, in this order; those from far away stay."""
+        """Return these rows in this order. Far returns stay."""
         return Cloud(
             self.cells[rows],
             self.points.take(rows, axis=0) if self.ranges is None else self.points,
@@ -126,8 +124,8 @@ NO_RETURNS = Cloud(np.empty(0, np.int64), np.empty((0, 3)), np.empty(0, np.int64
 
 
 def joined(clouds: Sequence[Cloud]) -> Cloud:
-    """The returns of clouds in the order of their cells, with the columns that all of them have;
-    those from far away joined in the same way.
+    """Join clouds in the order of their cells, with the columns that all of them have. Far returns
+    are joined in the same way.
     """
     cells = np.concatenate([cloud.cells for cloud in clouds])
     order = np.argsort(cells, kind="stable")
@@ -153,7 +151,7 @@ def _column(columns: Sequence[Any], order: Integers) -> Any:
 
 
 def cloud_of(scan: Scan, objects: Integers, grid: Grid) -> Cloud:
-    """The returns of a scan of a grid; `objects` (n,) are those behind its rows."""
+    """Return a scan of a grid as a cloud; `objects` (n,) are those behind its rows."""
     returned = np.isfinite(scan.ranges)
     points = scan.points
     if points is None:
@@ -164,22 +162,23 @@ def cloud_of(scan: Scan, objects: Integers, grid: Grid) -> Cloud:
 
 
 def pointless_cloud(scan: Scan, objects: Integers) -> Cloud:
-    """As `cloud_of`, with cells, objects and ranges alone: `points` is empty."""
+    """Return a cloud as `cloud_of` does, but with empty `points`."""
     (rows,) = np.nonzero(np.isfinite(scan.ranges))
     return Cloud(scan.cells[rows], np.empty((0, 3)), objects[rows], ranges=scan.ranges[rows])
 
 
 def rings_of(cells: Cells, grid: Grid) -> Integers:
-    """(n,) the lasers that fire the cells: its rows, 0 the lowest, as nuScenes counts."""
+    """Return (n,) the lasers that fire the cells: grid rows, 0 the lowest, as nuScenes counts."""
     return grid.rows - 1 - cells // grid.columns
 
 
 @dataclass(frozen=True)
 class IdentifiedDetections:
-    """Camera detections, with `objects` (n,) the annotated object or the body behind each box, or
-    NO_OBJECT. `visible` (n,) is the share of each object that its picture shows, where the source
-    annotates it; else boxes are those of what is visible. `pictures` (k, 2) are age (seconds) and
-    yaw change (radians) of the picture of each camera, where they are not all of the keyframe.
+    """Camera detections with the truth behind them. `objects` (n,) are the annotated object or the
+    body behind each box, or NO_OBJECT. `visible` (n,) is the visible share of each object, where
+    the source annotates it; otherwise boxes hold visible parts only. `pictures` (k, 2) are age
+    (seconds) and yaw change (radians) of each camera's picture, where pictures are older than the
+    keyframe.
     """
 
     detections: ImageDetections
@@ -188,7 +187,7 @@ class IdentifiedDetections:
     pictures: Floats | None = None
 
     def taken_at(self, pictures: Floats) -> "IdentifiedDetections":
-        """The same detections on `pictures` (k, 2) of such ages and yaw changes."""
+        """Return the same detections with the ages and yaw changes of `pictures` (k, 2)."""
         rows = self.detections.rows().copy()
         rows[:, ImageDetections.TIMING] = pictures[self.detections.cameras]
         detections = ImageDetections.from_checked_rows(rows)

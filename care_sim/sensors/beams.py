@@ -1,5 +1,5 @@
-"""What fired cells return where beams have strength, width and time: the bodies met, and the
-returns that are strong enough to be noticed.
+"""Returns of fired cells whose beams have strength, width and time. Finds the bodies that rays meet
+and keeps the returns that are strong enough.
 """
 
 from collections.abc import Callable
@@ -19,8 +19,8 @@ from care_sim.world.bullet import NO_BODY, BulletWorld
 from care_sim.world.motions import LinearMotion
 
 MOST_INSTANTS = 64
-"""Columns share an instant with their neighbours, 64 in a sweep. In 0.1 s and 512 columns that is
-0.7 ms from their own at the most, in which 30 m/s are 2 cm.
+"""Instants per sweep; neighbouring columns share one. In 0.1 s and 512 columns an instant is at
+most 0.7 ms from a column's own, in which 30 m/s are 2 cm.
 """
 
 
@@ -37,30 +37,30 @@ class RollingSweep:
         self._seconds = np.bincount(self._group_of, own) / np.bincount(self._group_of)
 
     def instants(self, cells: Cells) -> list[tuple[float, Integers]]:
-        """The instants at which some of `cells` (n,) fire, in seconds from the keyframe, below 0,
-        and the places among `cells` of those that do.
+        """Return the instants at which `cells` (n,) fire, seconds from the keyframe (negative).
+        Each comes with the places in `cells` that fire then.
         """
         groups = self._group_of[cells % self._columns]
         found = np.unique(groups).tolist()
         return [(float(self._seconds[one]), np.flatnonzero(groups == one)) for one in found]
 
     def seconds(self, cells: Cells) -> Floats:
-        """(n,) when each of `cells` fires, seconds from the keyframe."""
+        """Return (n,) when each of `cells` fires, seconds from the keyframe."""
         return self._seconds[self._group_of[cells % self._columns]]
 
 
 _RING = np.sqrt(7 / 12)
-"""How far from the middle the six lie, in half beams. So the seven rays, of equal weight, have the
-variance of a disc that is lit evenly: 1/4 of the half beam squared along each axis."""
+"""Distance of the six outer rays from the middle one, in half beams. So the seven equal rays have
+the variance of an evenly lit disc: 1/4 of the half beam squared along each axis.
+"""
 _CUT_APART = 1e-9
 """Radians between rows that are cut: rows of a grid descend."""
 
 
 def bundle(grid: Grid, divergence_mrad: float) -> list[Grid]:
-    """Grids whose cells hold one ray of each cell's beam; the grid itself, then those of the ring.
-
-    `divergence_mrad` is the angle between opposite edges of the beam in milliradians. At rows that
-    look up or down by e, beams are narrower across by cos(e).
+    """Return grids whose cells hold one ray of each cell's beam: the grid itself, then its ring.
+    `divergence_mrad` is the angle between opposite edges of the beam in milliradians. In a row at
+    elevation e beams are narrower across by cos(e).
     """
     if not isinstance(grid, AngularGrid):
         each = [_bundle(one, divergence_mrad) for one in grid.grids]
@@ -69,7 +69,7 @@ def bundle(grid: Grid, divergence_mrad: float) -> list[Grid]:
 
 
 def _bundle(grid: AngularGrid, divergence_mrad: float) -> list[AngularGrid]:
-    """The same of one LiDAR."""
+    """Return the bundle of one LiDAR."""
     radius = _RING * divergence_mrad / 2000
     angles = np.arange(6) * np.pi / 3
     around = zip(
@@ -79,25 +79,21 @@ def _bundle(grid: AngularGrid, divergence_mrad: float) -> list[AngularGrid]:
 
 
 def _shifted(grid: AngularGrid, across: float, up: float) -> AngularGrid:
-    """The grid turned to the left by `across` about its own axes, its rows raised by `up`,
-    radians.
-    """
+    """Return the grid turned left by `across` about its own axes and raised by `up`, radians."""
     from scipy.spatial.transform import Rotation
 
     raised = _raised(grid, up)
     turned = grid.heading + across
     if not grid.is_tilted:
         return replace(raised, heading=float(np.remainder(turned + np.pi, 2 * np.pi) - np.pi))
-    # A tilt is told about the heading: the same tilt is another one about another heading.
+    # A tilt is relative to the heading, so it changes with the heading.
     mount = grid.tilt * Rotation.from_euler("Z", turned)
     heading, lowered, roll = mount.as_euler("ZYX").tolist()
     return replace(raised, heading=heading, pitch=-lowered, roll=roll)
 
 
 def _raised(grid: AngularGrid, up: float) -> AngularGrid:
-    """The grid with its rows raised by `up` radians; straight up is as far up as a row goes, and
-    straight down as far down.
-    """
+    """Return the grid with its rows raised by `up` radians, at most to straight up or down."""
     rows = grid.elevations + up
     apart = _CUT_APART * np.arange(grid.rows)
     held = np.clip(rows, apart[::-1] - np.pi / 2, np.pi / 2 - apart)
@@ -107,8 +103,8 @@ def _raised(grid: AngularGrid, up: float) -> AngularGrid:
 
 
 class Beams:
-    """The beams of a LiDAR in a world, cast by the engine of a name. `motion` tells at any time how
-    the world moves.
+    """The beams of a LiDAR in a world, cast by a named engine. `motion` moves the world to any
+    time.
     """
 
     def __init__(
@@ -122,7 +118,7 @@ class Beams:
         self._world = world
         self._grid = grid
         divergence = settings.lidar_divergence_mrad
-        # The rays of each beam: a grid and an engine for the first, the second, ...
+        # Each ray of a beam has its own grid and engine.
         grids = bundle(grid, divergence) if divergence else [grid]
         self._rays = [(one, make_engine(engine, world, one)) for one in grids]
         self._kept = settings.lidar_returns
@@ -135,9 +131,9 @@ class Beams:
     def cast(
         self, sensor: Frame, cells: Cells, shots: Integers | None = None
     ) -> tuple[Scan, Integers]:
-        """The returns of `cells` (n,), ascending, from the frame `sensor` of the keyframe, and the
-        body behind each, NO_BODY where nothing returned. `shots` (N,) says of all cells of the grid
-        how often they fire; each of `cells` once, unless given.
+        """Return the returns of ascending `cells` (n,) and the body behind each, NO_BODY without a
+        return. `sensor` is the keyframe's frame. `shots` (N,) is how often each cell of the grid
+        fires; by default each of `cells` fires once.
         """
         if self._sweep is None:
             return self._scan(cells, self._cast_at_once(sensor, cells, shots))
@@ -151,8 +147,8 @@ class Beams:
         return self._scan(cells, Echoes.joined(parts))
 
     def compensated(self, scan: Scan, sensor: Frame) -> Scan:
-        """The scan with the points of its returns as if the car had stood where it is in the frame
-        `sensor` of the keyframe, if the ego's motion is compensated; else the scan.
+        """Return the scan with the ego's motion compensated, if the sensor does that. Points then
+        lie as if the car had stood still in the keyframe's frame `sensor`.
         """
         if not self._compensates or scan.times is None:
             return scan
@@ -161,8 +157,8 @@ class Beams:
         return replace(scan, points=self._motion().compensated(points, sensor, scan.times))
 
     def _cast_at_once(self, sensor: Frame, cells: Cells, shots: Integers | None) -> Echoes:
-        """What is noticed of cells that fire at one instant, at which the sensor is in this frame;
-        `Echoes.beams` are places in `cells`.
+        """Return the noticed echoes of cells that fire together from this frame. `Echoes.beams` are
+        places in `cells`.
         """
         met = [self._meet(sensor, cells, *ray) for ray in self._rays]
         if len(met) > 1:
@@ -178,7 +174,7 @@ class Beams:
     def _meet(
         self, sensor: Frame, cells: Cells, grid: Grid, engine: Engine
     ) -> tuple[Floats, Floats, Integers]:
-        """Ranges (n,), intensities (n,) and bodies (n,) of one ray of every cell."""
+        """Return ranges (n,), intensities (n,) and bodies (n,) of one ray per cell."""
         ranges, bodies = engine.cast(sensor, cells)
         rays = sensor.vectors_to_world(grid.directions[cells])
         origins = sensor.origin + sensor.vectors_to_world(grid.origins_of(cells))
@@ -186,7 +182,7 @@ class Beams:
         return ranges, self._signal.intensities(bright, ranges), bodies
 
     def _scan(self, cells: Cells, echoes: Echoes) -> tuple[Scan, Integers]:
-        """The echoes as a scan, with a row for each cell that has none."""
+        """Return the echoes as a scan, with an empty row for each cell without an echo."""
         silent = np.setdiff1d(np.arange(len(cells)), echoes.beams)
         count = len(silent)
         nothing = Echoes(silent, np.full(count, np.inf), np.zeros(count), np.full(count, NO_BODY))

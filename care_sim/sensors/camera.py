@@ -19,12 +19,12 @@ from care_sim.sensors.camera_faults import Delay, Detected, Misses
 from care_sim.sensors.camera_profiles import YOLOX
 from care_sim.sensors.false_boxes import EMPTY_POOL, NO_ROWS, BoxPool, FalseBoxes
 from care_sim.sensors.kitti.detector import KittiDetector
-from care_sim.sensors.pictures import surest_first
+from care_sim.sensors.pictures import sort_by_confidence
 
 
 class PictureTiming(NamedTuple):
-    """One picture per keyframe: it is taken `after_s` seconds after it, and its detections arrive
-    `keyframes` keyframes after it.
+    """When pictures are taken and arrive. Each keyframe has a picture, taken `after_s` seconds
+    later. Its detections arrive `keyframes` keyframes later.
     """
 
     keyframes: int
@@ -32,10 +32,9 @@ class PictureTiming(NamedTuple):
 
 
 def picture_timing(faults: CameraFaults, keyframe_s: float, step_s: float) -> PictureTiming:
-    """The timing that `faults` ask for, of pictures that can be taken every `step_s` seconds, of
-    which a keyframe of `keyframe_s` is a whole number.
-
-    A latency in seconds is met by the newest picture that is at least so old.
+    """Return the timing that `faults` set. Pictures can be taken every `step_s` seconds; a keyframe
+    of `keyframe_s` is a whole number of steps. The newest picture that is at least as old as a
+    latency in seconds is used.
     """
     if not faults.camera_latency_s:
         return PictureTiming(faults.camera_latency, 0.0)
@@ -53,9 +52,8 @@ NOTHING_SEEN = IdentifiedDetections(
 
 
 def mounted(camera: PinholeCamera, faults: CameraFaults, rng: np.random.Generator) -> PinholeCamera:
-    """The camera as it really stands: turned and moved by errors that the rig does not know."""
-    # Drawn even where both spreads are 0, so that to switch one error on does not change what is
-    # drawn for the other.
+    """Return the camera as mounted, with errors of pose that the rig does not know."""
+    # Draw even where a spread is 0: switching on one error then leaves the other's draws unchanged.
     yaw, pitch = np.deg2rad(faults.camera_rotation_sigma_deg) * rng.standard_normal(2)
     shift = faults.camera_position_sigma_m * rng.standard_normal(3)
     x, y, z = (float(value) for value in camera.position + shift)
@@ -65,11 +63,10 @@ def mounted(camera: PinholeCamera, faults: CameraFaults, rng: np.random.Generato
 
 
 class CameraDetector:
-    """Makes of faultless detections those that arrive: they err and lag as `sensing` says.
-
-    `objects` (n,) are all that the detector may ever report; `cameras` those that the rig knows.
-    False boxes are made from `pool`. Pictures can be taken every `step_s` seconds, by default at
-    keyframes alone.
+    """Turns faultless detections into those that arrive, with the errors and delays of `sensing`.
+    `objects` (n,) are all objects that the detector may ever report. `cameras` are those that the
+    rig knows. False boxes are drawn from `pool`. Pictures can be taken every `step_s` seconds, by
+    default at keyframes only.
     """
 
     def __init__(
@@ -97,7 +94,7 @@ class CameraDetector:
         self._delay = Delay(*late, keyframe_s, self.timing.after_s)
         self._delay.begin(0, own[1])
         self.mounted = tuple(mounted(camera, sensing, mount) for camera in cameras)
-        """The cameras as they really stand."""
+        """The cameras as mounted, errors included."""
         self._measured: ProfiledDetector | KittiDetector | None = None
         seeds = errors, jitter, confusion, ghosts
         objects_seen = self._objects, self.mounted, keyframe_s
@@ -109,23 +106,19 @@ class CameraDetector:
     def detect(
         self, seen: IdentifiedDetections, heading: float, boxes: Floats, time_s: float
     ) -> IdentifiedDetections:
-        """The newest detections at a keyframe whose pictures are taken at the keyframe itself: see
-        `take` and `newest`.
-        """
+        """Take a keyframe's pictures and return the newest detections: `take`, then `newest`."""
         self.take(seen, heading, boxes, time_s)
         return self.newest(heading)
 
     def take(
         self, seen: IdentifiedDetections, heading: float, boxes: Floats, time_s: float
     ) -> None:
-        """Take in the pictures of a keyframe.
-
-        `seen` are their faultless detections, at `time_s` and with the car's `heading`; `boxes`
-        (n, 7) are those of the objects in the sensor frame, in their order, 0 of one that is
-        nowhere.
+        """Take the pictures of a keyframe. `seen` are their faultless detections, at `time_s` and
+        with the car's `heading`. `boxes` (n, 7) are those of all objects in the sensor frame, in
+        their order, 0 for an absent object.
         """
-        # All faults draw at every keyframe, whatever is there and whatever becomes of it, so that
-        # every policy meets the same ones.
+        # All faults draw at every keyframe, whatever is visible, so that every policy meets the
+        # same faults.
         rows = seen.detections.rows()
         objects = seen.objects
         missed = self._misses.draw(_HERE, planar_ranges(boxes)[None])[0]
@@ -149,21 +142,20 @@ class CameraDetector:
         if self._sensing.black_at(time_s):
             rows, objects = rows[:0], objects[:0]
         # Of equally sure boxes the leftmost comes first: nothing depends on the order of bodies.
-        rows, objects = surest_first(rows, objects, self._least_confidence)
+        rows, objects = sort_by_confidence(rows, objects, self._least_confidence)
         seen_here = Detected(np.array([len(rows)]), rows[None], objects[None])
         self._delay.take(_HERE, seen_here, np.array([heading], float))
 
     def newest(self, heading: float) -> IdentifiedDetections:
-        """Begin a keyframe with the car's `heading`: the newest detections that are due, the surest
-        first, each with the object behind it.
+        """Begin a keyframe with the car's `heading`. Return the newest detections that are due, the
+        surest first, each with the object behind it.
         """
         return self._delay.newest(_HERE, np.array([heading], float)).take(0)
 
 
 def _with_false_boxes(rows: Floats, objects: Integers, false: Floats) -> tuple[Floats, Integers]:
-    """True and `false` boxes in an order of their numbers alone.
-
-    Boxes of equal confidence and left edge keep this order, so it must not tell which are false.
+    """Merge true and `false` boxes, ordered by their numbers alone. Boxes of equal confidence and
+    left edge keep this order, so the order must not reveal which are false.
     """
     together = np.concatenate([rows, false])
     order = np.lexsort(together.T)

@@ -1,12 +1,11 @@
-"""What a measured camera detector gets wrong (`care_sim.sensors.camera_profiles`): whom it finds,
-how its boxes jitter, which classes it confuses, which ghosts it reports, how long an error lasts.
+"""Errors of a measured camera detector (`care_sim.sensors.camera_profiles`): misses, box jitter,
+confused classes, ghosts, and how long an error lasts.
 
-It finds an object by its height in the picture and its visible share. The height is that of the
-object's whole 3D box as the picture shows it, hidden or not: the box of its eight corners, cut at
-the picture's edges. The visible share is the area of the box round the visible pixels over the area
-that this box has when nothing hides the object, which is a share of its whole box (`UNHIDDEN`).
-CityPersons defines visibility alike, by boxes (Zhang et al. 2017). Where a source tells the share
-itself, as nuScenes does in levels, that one counts.
+Detection depends on an object's height in the picture and its visible share. The height is that of
+the object's whole projected 3D box, hidden or not, cut at the picture's edges. The visible share
+compares two areas: the box round the visible pixels, and the same box when nothing hides the
+object, a share of the whole box (`UNHIDDEN`). CityPersons also defines visibility by boxes (Zhang
+et al. 2017). A source that annotates the share itself, as nuScenes does in levels, overrides this.
 """
 
 from collections.abc import Sequence
@@ -25,12 +24,10 @@ from care_sim.sensors.false_boxes import NO_ROWS, BoxPool, box_areas, without_du
 
 
 class PersistentDraws:
-    """Numbers (n, k) from 0 to 1, k of each of n objects, evenly distributed at every keyframe.
-
-    From one keyframe to the next each stays with the chance exp(-keyframe / time) and else is drawn
-    anew. So the autocorrelation of whatever is made of one number alone is exp(-t / time), as long
-    as what it is made with stays. Two draws are taken for each at every keyframe, seen or not, so
-    that every policy meets the same.
+    """Random numbers (n, k) from 0 to 1, k per object, uniform at every keyframe. From one keyframe
+    to the next each number stays with the chance exp(-keyframe / time); otherwise it is drawn anew.
+    So any function of one number alone has the autocorrelation exp(-t / time). Every number takes
+    two draws per keyframe, seen or not, so that every policy meets the same.
     """
 
     def __init__(
@@ -47,7 +44,7 @@ class PersistentDraws:
         self._started = False
 
     def next(self) -> Floats:
-        """(n, k) the numbers of the next keyframe, read-only by agreement."""
+        """Return (n, k) the numbers of the next keyframe. Do not write to them."""
         if self._started:
             stays, fresh = self._rng.random((2, *self._numbers.shape))
             self._numbers = np.where(stays < self._stays, self._numbers, fresh)
@@ -56,9 +53,9 @@ class PersistentDraws:
 
 
 UNHIDDEN = {"car": 0.98, "truck": 0.99, "bus": 1.0, "bicycle": 0.80, "pedestrian": 0.84}
-"""The share of its whole box that the box round an object's pixels has when nothing hides it: the
-medians of the catalogue's bodies, seen from all sides at 10 to 30 m. The corners of a turned box
-stay empty, of slender bodies most.
+"""Share of an unhidden object's whole box that the box round its pixels fills. Medians of the
+catalogue's bodies, seen from all sides at 10 to 30 m. The corners of a turned box stay empty, most
+for slender bodies.
 """
 _UNHIDDEN = np.array([UNHIDDEN[name] for name in CLASSES])
 
@@ -66,8 +63,9 @@ _UNHIDDEN = np.array([UNHIDDEN[name] for name in CLASSES])
 def seen_as(
     seen: IdentifiedDetections, boxes: Floats, cameras: Sequence[PinholeCamera], focal_px: float
 ) -> tuple[Floats, Floats]:
-    """(n,) heights in pixels of a picture of the focal length `focal_px`, and (n,) visible shares,
-    of the detections `seen` of objects with the sensor-frame `boxes` (n, 7).
+    """Return (n,) heights and (n,) visible shares of the detections `seen`. Heights are in pixels
+    of a picture of the focal length `focal_px`. `boxes` (n, 7) are the objects' boxes in the sensor
+    frame.
     """
     heights = np.empty(len(seen))
     shares = np.empty(len(seen))
@@ -80,7 +78,7 @@ def seen_as(
 
 
 def whole_boxes(camera: PinholeCamera, boxes: Floats) -> Floats:
-    """(n, 4) what whole 3D boxes (n, 7) span in the picture, cut at its edges."""
+    """Return (n, 4) the image boxes of whole 3D boxes (n, 7), cut at the picture's edges."""
     limits = np.tile([camera.width, camera.height], 2)
     # What is wholly behind the camera spans nothing.
     return np.clip(np.nan_to_num(camera.project_boxes(boxes), nan=0.0), 0.0, limits)
@@ -97,18 +95,17 @@ LEAST_PX = 1.0
 """Width and height that a box keeps within its picture."""
 
 
-def jittered(
+def jitter_boxes(
     boxes: Floats,
     draws: Floats,
     spreads: Floats,
     of_cameras: Integers,
     cameras: Sequence[PinholeCamera],
 ) -> Floats:
-    """(n, 4) image `boxes` (n, 4) after Gaussian errors, cut at the edges of their pictures.
-
+    """Return (n, 4) image `boxes` after Gaussian errors, cut at the edges of their pictures.
     `spreads` (n, 4) are relative to the box: of its middle across and down, and of the logarithms
-    of its width and height. `draws` (n, 4) from 0 to 1 decide; 0.5 leaves a box as it is.
-    `of_cameras` (n,) are places in `cameras`.
+    of its width and height. `draws` (n, 4) from 0 to 1 set the errors; 0.5 means none. `of_cameras`
+    (n,) are places in `cameras`.
     """
     from scipy.special import ndtri
 
@@ -124,11 +121,10 @@ def jittered(
     return np.concatenate([low, high], axis=1)
 
 
-def confused(classes: Integers, draws: Floats, matrix: Floats) -> Integers:
-    """(n,) the classes that are reported of objects of `classes` (n,).
-
-    `matrix` (c, c) holds the chances that the class of a row is reported as that of a column;
-    `draws` (n,) from 0 to 1 decide.
+def confuse_classes(classes: Integers, draws: Floats, matrix: Floats) -> Integers:
+    """Return (n,) the classes reported for objects of `classes` (n,). `matrix` (c, c) holds the
+    chances that the class of a row is reported as the class of a column. `draws` (n,) from 0 to 1
+    decide.
     """
     # The reported class is the first whose chance, with those before it, is beyond the draw. The
     # last sum is 1 but for its last bits.
@@ -139,8 +135,8 @@ def confused(classes: Integers, draws: Floats, matrix: Floats) -> Integers:
 
 @dataclass(frozen=True)
 class _Ghost:
-    """It follows the pool's `object` in the pictures of its `camera`, which were taken `later_s`
-    seconds after those in which it is shown; `draws` (3,) vary its boxes.
+    """A false box that follows the pool's `object` in the pictures of its `camera`. Those pictures
+    were taken `later_s` seconds after the current ones. `draws` (3,) vary its boxes.
     """
 
     object: int
@@ -150,14 +146,12 @@ class _Ghost:
 
 
 class Ghosts:
-    """False boxes that are born, follow an object of the pool, and end.
-
-    `rate` of them are there per picture on the mean, each for `time_s` seconds on the mean; lives
-    are exponentially distributed, and end when the pool's object leaves its pictures. A ghost is
-    born as one of the boxes that are usable then, varied a little, and shows what became of that
-    object later. So it moves as something of its kind that the car passes. While it lies on another
-    box of its class it is not shown, as a detector suppresses duplicates. What is drawn does not
-    depend on what is there: every policy meets the same ghosts.
+    """False boxes that are born, follow an object of the pool, and end. The mean number per picture
+    is `rate`, the mean life `time_s` seconds. Lives are exponentially distributed, and end when the
+    pool's object leaves its pictures. A ghost starts as one of the boxes that are usable then,
+    slightly varied, and shows what happened to that object later. So it moves like an object that
+    the car passes. A ghost on another box of its class is not shown, since detectors suppress
+    duplicates. Draws do not depend on the scene: every policy meets the same ghosts.
     """
 
     def __init__(
@@ -177,7 +171,7 @@ class Ghosts:
         self._started = False
 
     def draw(self, shown: Floats, time_s: float) -> Floats:
-        """(k, 9) the ghosts in the pictures of this keyframe, beside the boxes `shown` (n, 9)."""
+        """Return (k, 9) the ghosts of this keyframe, given the boxes `shown` (n, 9)."""
         stay = self._rng.random(len(self._alive)) < self._stays
         self._alive = [one for one, stays in zip(self._alive, stay, strict=True) if stays]
         # As many are born as end on the mean. The first picture has those of the long run.
@@ -195,7 +189,7 @@ class Ghosts:
         return without_duplicates(varied[:, None], shown)
 
     def _born(self, draws: Floats, time_s: float) -> list[_Ghost]:
-        """A ghost for every row of `draws` (k, 4): one picks its box, three vary it."""
+        """Make a ghost for every row of `draws` (k, 4): one picks its box, three vary it."""
         pool = self._pool
         usable = pool.usable(time_s)
         if not len(usable):
@@ -212,7 +206,7 @@ class Ghosts:
         ]
 
     def _row(self, ghost: _Ghost, time_s: float) -> int | None:
-        """The box of the pool that a ghost shows now, None if there is none any more."""
+        """Return the pool's box that a ghost shows now, None if it has ended."""
         pool = self._pool
         is_now = np.abs(pool.times_s - time_s - ghost.later_s) <= LAST_BITS_S
         is_own = (pool.objects == ghost.object) & (pool.cameras == ghost.camera)
@@ -225,10 +219,9 @@ _JITTERED = 4
 
 
 class ProfiledDetector:
-    """Makes of faultless detections what a detector of a profile reports.
-
-    `objects` (n,) are all that it may ever find, `cameras` those that take the pictures. Ghosts are
-    made from `pool`. Every kind of error has a random stream of its own.
+    """Turns faultless detections into the reports of a profiled detector. `objects` (n,) are all
+    objects that it may ever detect, `cameras` those that take the pictures. Ghosts are drawn from
+    `pool`. Every kind of error has its own random stream.
     """
 
     def __init__(
@@ -267,17 +260,16 @@ class ProfiledDetector:
     def detect(
         self, seen: IdentifiedDetections, boxes: Floats, false: Floats, time_s: float
     ) -> tuple[Floats, Integers, Floats]:
-        """What is reported of the faultless detections `seen` (m,): rows (k, 9) as
-        `ImageDetections.rows`, (k,) the object behind each, and the rows (j, 9) of false boxes.
-
-        `boxes` (n, 7) are the 3D boxes of all objects in the sensor frame, `false` (l, 9) the false
-        boxes that no ghost may lie on.
+        """Return the reported boxes of the faultless detections `seen` (m,). Returns rows (k, 9) as
+        `ImageDetections.rows`, (k,) the object behind each, and rows (j, 9) of false boxes. `boxes`
+        (n, 7) are the 3D boxes of all objects in the sensor frame. `false` (l, 9) are false boxes
+        that no ghost may overlap.
         """
         ghosts = self._ghosts.draw(np.concatenate([seen.detections.rows(), false]), time_s)
         return *self._report(seen, boxes), np.concatenate([false, ghosts])
 
     def _report(self, seen: IdentifiedDetections, boxes: Floats) -> tuple[Floats, Integers]:
-        # Where the detections' objects stand among all.
+        # Places of the detections' objects among all objects.
         places = self._order[np.searchsorted(self._objects, seen.objects, sorter=self._order)]
         # All numbers are drawn at every keyframe, whatever is there.
         misses, jitter, confusion = (
@@ -289,8 +281,10 @@ class ProfiledDetector:
         (found,) = np.nonzero(own_misses < self._recalls(seen, groups, boxes[places]))
 
         rows = seen.detections.rows()[found]
-        rows[:, ImageDetections.CLASS] = confused(classes[found], confusion[found, 0], self._matrix)
-        rows[:, ImageDetections.BOX] = jittered(
+        rows[:, ImageDetections.CLASS] = confuse_classes(
+            classes[found], confusion[found, 0], self._matrix
+        )
+        rows[:, ImageDetections.BOX] = jitter_boxes(
             rows[:, ImageDetections.BOX],
             jitter[found],
             self._spreads[groups[found]],
@@ -300,7 +294,7 @@ class ProfiledDetector:
         return rows, seen.objects[found]
 
     def _recalls(self, seen: IdentifiedDetections, groups: Integers, boxes: Floats) -> Floats:
-        """(m,) the chances to find the objects `seen` (m,) of `groups` (m,) with `boxes` (m, 7)."""
+        """Return (m,) recalls of the objects `seen` (m,) of `groups` (m,) with `boxes` (m, 7)."""
         heights, shares = seen_as(seen, boxes, self._cameras, self._profile.focal_px)
         recalls = np.empty(len(seen))
         for number, group in enumerate(self._profile.groups):

@@ -1,7 +1,5 @@
-"""What goes wrong between the pictures of W worlds and the detections that arrive, in each world by
-its own faults.
-
-Random numbers are drawn for many keyframes at once.
+"""Camera faults of W worlds: misses, delays and lost detections, per world. Random numbers are
+drawn for many keyframes at once.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,13 +14,13 @@ from care_sim.core.conditions import CameraFaults
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import IdentifiedDetections
 
-# Numbers of a module are what compiled code can hold.
+# Compiled code can only read module-level constants.
 _AGE, _YAW_CHANGE = ImageDetections.AGE, ImageDetections.YAW_CHANGE
 
 
 class Detected(NamedTuple):
-    """Camera detections: `counts` (W,); `rows` (W, D, 9) in the order of
-    `ImageDetections.COLUMNS`; and the `objects` (W, D) behind them, bodies or NO_OBJECT.
+    """Camera detections of W worlds: `counts` (W,), `rows` (W, D, 9) in the order of
+    `ImageDetections.COLUMNS`, and `objects` (W, D), bodies or NO_OBJECT.
     """
 
     counts: Integers
@@ -31,27 +29,26 @@ class Detected(NamedTuple):
 
     @classmethod
     def of(cls, worlds: int, most: int) -> "Detected":
-        """Tables for so many of each world."""
+        """Return empty tables for this many detections per world."""
         rows = np.zeros((worlds, most, len(ImageDetections.COLUMNS)))
         return cls(np.zeros(worlds, np.int64), rows, np.zeros((worlds, most), np.int64))
 
     def put(self, world: int, arrived: IdentifiedDetections) -> "Detected":
-        """Write those of a world; longer tables, if they need more room than there is."""
+        """Write a world's detections. Returns longer tables if they need more room."""
         self.counts[world] = len(arrived)
         rows = filled(self.rows, world, arrived.detections.rows())
         return Detected(self.counts, rows, filled(self.objects, world, arrived.objects))
 
     def take(self, world: int) -> IdentifiedDetections:
-        """A copy of those of a world."""
+        """Return a copy of a world's detections."""
         own = slice(self.counts[world])
         detections = ImageDetections.from_checked_rows(self.rows[world, own].copy())
         return IdentifiedDetections(detections, self.objects[world, own].copy())
 
 
 class Misses:
-    """Which objects the cameras miss: in the long run the stated share, in bursts of keyframes.
-
-    One number is drawn for every object at every keyframe, seen or not, so that every policy meets
+    """Draws which objects the cameras miss. The long-run share is as stated; misses last for bursts
+    of keyframes. Each object takes one draw per keyframe, seen or not, so that every policy meets
     the same misses.
     """
 
@@ -75,8 +72,8 @@ class Misses:
             self._started[world] = False
 
     def draw(self, live: Mask, ranges: Floats) -> Mask:
-        """(W, R) who is missed at this keyframe of the worlds that are `live`; `ranges` (W, R) are
-        distances in metres.
+        """Return (W, R) which objects are missed at this keyframe of the `live` worlds. `ranges`
+        (W, R) are metres.
         """
         if not self.any:
             return np.zeros(ranges.shape, np.bool_)
@@ -97,18 +94,16 @@ class Misses:
 
 
 def miss_rates(rate: Floats, per_m: Floats, ranges: Floats) -> Floats:
-    """The share of keyframes at which objects so many metres away are missed, in any shape, by
+    """Return the long-run share of missed keyframes at these distances, metres, any shape. Uses
     `false_negative_rate` and `false_negative_per_m`.
     """
     return np.minimum(rate + per_m * ranges, 1.0)
 
 
 def first_bursts(rates: Floats, draws: Floats, burst: Integers) -> Integers:
-    """For how many keyframes, from the first on, objects are missed that have these rates and
-    draws. Arrays of one shape.
-
-    The first keyframe shows the long run: an object is missed at its rate, and whoever is missed is
-    at any keyframe of its burst with equal chance.
+    """Return for how many keyframes, from the first on, objects are missed. Arrays of rates and
+    draws have one shape. The first keyframe shows the long run: an object is missed at its rate,
+    and is equally likely at any keyframe of its burst.
     """
     hit = draws < rates
     # A draw below the rate, divided by it, is again evenly distributed from 0 to 1.
@@ -118,8 +113,8 @@ def first_bursts(rates: Floats, draws: Floats, burst: Integers) -> Integers:
 
 
 def later_bursts(lasting: Integers, rates: Floats, draws: Floats, burst: Integers) -> Integers:
-    """The same at a later keyframe, before which they were missed for `lasting` more: bursts begin
-    among the objects that are in none.
+    """Return the same at a later keyframe, given the keyframes `lasting` of current bursts. Bursts
+    begin among the objects that are in none.
     """
     # With the chance p that a burst of L keyframes begins, (1 - p) / p keyframes without one lie
     # between two bursts on the mean. The share of missed keyframes is L / (L + (1 - p) / p); it is
@@ -138,10 +133,10 @@ def _below(rng: np.random.Generator, most: int, keyframes: int) -> Integers:
 
 
 class _Sent(NamedTuple):
-    """The pictures on their way, in a ring of L places each: `counts` (W, L), `rows`
-    (W, L, D, 9) and `objects` (W, L, D) of their detections, the car's `headings` (W, L) when they
-    were taken, and the keyframes at which they are `due` (W, L). `taken` (W,) counts them, `begun`
-    (W,) the keyframes.
+    """Pictures on their way, in a ring of L places per world. `counts` (W, L), `rows` (W, L, D, 9)
+    and `objects` (W, L, D) are their detections. `headings` (W, L) are the car's when they were
+    taken, `due` (W, L) the keyframes of arrival. `taken` (W,) counts pictures, `begun` (W,)
+    keyframes.
     """
 
     counts: Integers
@@ -154,10 +149,9 @@ class _Sent(NamedTuple):
 
 
 class Delay:
-    """Hands out the newest picture that has arrived.
-
-    One is taken per keyframe, `after_s` seconds after it. Each is late by its world's one of the
-    `latencies` (W,), keyframes, and by 0 to that of the `jitters` (W,) more that are drawn for it.
+    """Delivers the newest picture that has arrived. One picture per keyframe is taken, `after_s`
+    seconds later. Its delay is the world's `latencies` (W,) keyframes, plus a draw from 0 to its
+    `jitters` (W,).
     """
 
     def __init__(
@@ -188,10 +182,10 @@ class Delay:
             self._draws.begin(world, partial(_below, rng, most))
 
     def take(self, live: Mask, seen: Detected, headings: Floats) -> None:
-        """Take in what is `seen` in the pictures of a keyframe of the worlds that are `live`, taken
-        by cars with these `headings` (W,), radians.
+        """Take the detections `seen` in a keyframe's pictures of the `live` worlds. `headings` (W,)
+        are the cars', radians.
         """
-        # Lateness is drawn for every picture in turn, whatever it shows.
+        # Every picture draws its delay, whatever it shows.
         late = self._latencies
         if self._jitters.any():
             late = late + self._draws.next(live, 1)[:, 0].astype(np.int64)
@@ -206,8 +200,8 @@ class Delay:
         _send(live, seen, headings, late, self._sent)
 
     def newest(self, live: Mask, headings: Floats) -> Detected:
-        """Begin a keyframe of the worlds that are `live`, the cars with these `headings` (W,); the
-        newest detections that are due, with age and yaw change. The next call fills them anew.
+        """Begin a keyframe of the `live` worlds with the cars' `headings` (W,). Return the newest
+        detections that are due, with age and yaw change. The next call overwrites them.
         """
         _deliver(live, headings, self._keyframe_s, self._after_s, self._sent, self._arrived)
         return self._arrived
@@ -247,8 +241,8 @@ def _deliver(
         keyframe = sent.begun[w]
         sent.begun[w] += 1
         arrived.counts[w] = 0
-        # The newest first. Jitter lets a picture overtake the ones before it, which are then never
-        # handed out: what has been due once is so later.
+        # The newest first. With jitter a picture can overtake earlier ones, which are then never
+        # delivered.
         for age in range(min(keyframe + 1, places)):
             number = keyframe - age
             place = number % places
@@ -263,7 +257,7 @@ def _deliver(
 
 
 _KEYFRAMES = 64
-"""For how many keyframes numbers are drawn at once."""
+"""Keyframes for which numbers are drawn at once."""
 
 
 Draw = Callable[[int], np.ndarray]
@@ -273,7 +267,9 @@ NumPy they are those of k calls for one.
 
 
 class DrawnAhead:
-    """A row of numbers per world and keyframe, as long as the most that a world needs."""
+    """Random numbers drawn ahead: a row per world and keyframe, as long as the longest that a world
+    needs.
+    """
 
     def __init__(self, worlds: int):
         self._draws: list[Draw | None] = [None] * worlds
@@ -286,9 +282,7 @@ class DrawnAhead:
         self._used[world] = 0
 
     def next(self, live: Mask, width: int) -> Floats:
-        """(W, width) the numbers of the coming keyframe of the worlds that are `live`, 1.0 behind
-        those that one needs.
-        """
+        """Return (W, width) the next keyframe's numbers of the `live` worlds, padded with 1.0."""
         missing = width - self._numbers.shape[2]
         if missing > 0:
             room = (0, 0), (0, 0), (0, missing)

@@ -1,11 +1,11 @@
 """Named camera detectors: the numbers by which each finds objects and errs.
 
-`yolox` is measured on detections that others published: those of YOLOX on the 21 training drives of
-KITTI's tracking benchmark (10 pictures/s, 1242 x 375 pixels, focal length 721.5 pixels), in the
-repository of DeepFusionMOT (Wang et al., RA-L 2022; `data/detections/2D/yolox/train` at commit
-832ab54), beside KITTI's labels. Least confidence 0.5 of pedestrians and 0.3 of cars. A label counts
-as found if a box of its class overlaps it by an IoU of 0.5. How each number was read, and what is
-assumed: `docs/camera.md`.
+`yolox` is measured on published detections of YOLOX on the 21 training drives of KITTI's tracking
+benchmark, beside KITTI's labels. Pictures have 1242 x 375 pixels, a focal length of 721.5 pixels,
+10 per second. Source: the repository of DeepFusionMOT (Wang et al., RA-L 2022),
+`data/detections/2D/yolox/train` at commit 832ab54. Least confidence 0.5 of pedestrians and 0.3 of
+cars. A label counts as found if a box of its class overlaps it by an IoU of 0.5. How each number
+was read, and what is assumed: `docs/camera.md`.
 """
 
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ class RecallTable:
 
 @dataclass(frozen=True)
 class GroupProfile:
-    """What holds for a group of classes.
+    """Numbers of a group of classes.
 
     `miss_time_s` is the correlation time of its misses. `jitter` are spreads, relative to the box:
     its middle across and down, and the logarithms of its width and height.
@@ -58,12 +58,10 @@ class GroupProfile:
 
 @dataclass(frozen=True)
 class CameraProfile:
-    """A detector. Heights in pixels are those of pictures of the focal length `focal_px`.
-
-    `group_of` (5,) tells the place in `groups` of every class. `confusion` maps (true, reported)
-    class names to the share of found objects of the one that are reported as the other.
-    `ghosts_per_picture` false boxes are there on the mean; one is in the next picture, dt later,
-    too with the chance exp(-dt / `ghost_time_s`).
+    """A detector. Heights are in pixels of the focal length `focal_px`. `group_of` (5,) is the
+    place in `groups` of every class. `confusion` maps (true, reported) class names to the share of
+    found objects that are so confused. `ghosts_per_picture` false boxes are there on the mean; one
+    is in the next picture, dt later, too with the chance exp(-dt / `ghost_time_s`).
     """
 
     focal_px: float

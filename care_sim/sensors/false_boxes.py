@@ -35,12 +35,13 @@ NO_ROWS = np.empty((0, len(ImageDetections.COLUMNS)))
 
 @dataclass(frozen=True, eq=False)
 class BoxPool:
-    """Boxes of other times: `rows` (n, 9) as `ImageDetections.rows`, `times_s` (n,) when each was
-    seen, `middles` (n, 2) of their pictures in pixels, `picture_times_s` (k,) when pictures were
-    taken, `objects` (n,) the object or body behind each.
+    """Boxes of other times, from which false boxes are drawn. `rows` (n, 9) are as
+    `ImageDetections.rows`, seen at `times_s` (n,). `middles` (n, 2) are the middles of their
+    pictures in pixels. `picture_times_s` (k,) are the times of pictures, `objects` (n,) the object
+    or body behind each box.
 
-    At a time those are usable that were seen at least `apart_s` and at most `near_s` before or
-    after it.
+    A box is usable if it was seen at least `apart_s` and at most `near_s` before or after the
+    current time.
     """
 
     rows: Floats
@@ -86,12 +87,12 @@ class BoxPool:
         return len(self.usable(time_s)) / pictures / usual if pictures and usual else 0.0
 
     def varied(self, rows: Integers, draws: Floats) -> Floats:
-        """(k, 9) the boxes at `rows` (k,), varied as `draws` (k, 3) from 0 to 1 say: nearer or
-        farther, aside, more or less hidden.
+        """Return (k, 9) the boxes at `rows` (k,), varied by `draws` (k, 3) from 0 to 1: distance,
+        side, hidden share.
 
-        A variation that would leave the edges or the least confidence of the pool is made the other
-        way round; one that would leave them that way too is not made. So nothing heaps up at these
-        bounds. An edge that the picture cuts stays cut.
+        A variation that would leave the edges or the least confidence of the pool is inverted. If
+        the inverse also leaves them, the box stays as it was. So nothing heaps up at these bounds.
+        An edge that the picture cuts stays cut.
         """
         # The second choice is the opposite variation, the last the box as it was.
         departures = (2 * draws - 1) * (NEARER, ASIDE, MORE_HIDDEN)
@@ -109,11 +110,9 @@ class BoxPool:
         return usable
 
     def _moved(self, rows: Integers, departures: Floats) -> tuple[Floats, Mask]:
-        """(k, 9) the boxes at `rows` (k,) after `departures`, and (k,) which of them are within the
-        bounds of the pool.
-
-        `departures` (k, 3) are how much nearer and how much more hidden, as logarithms of the
-        factors, and between them how far to the right, as a share of the picture's width.
+        """Return (k, 9) the boxes at `rows` (k,) after `departures`, and (k,) which of them stay
+        within the bounds of the pool. `departures` (k, 3) are log factors of nearness and of the
+        hidden share; between them the shift to the right, as a share of the picture's width.
         """
         moved = self.rows[rows]
         boxes = moved[:, _BOX].copy()
@@ -221,7 +220,7 @@ def _rounded(values: Floats, step: float) -> Floats:
 
 
 DUPLICATE_IOU = 0.5
-"""Of two boxes of a class that overlap this much a detector reports one (non-maximum suppression,
+"""Overlap above which a detector reports one of two boxes of a class (non-maximum suppression,
 PASCAL VOC).
 """
 MOST_DRAWS = 8
@@ -263,9 +262,9 @@ class FalseBoxes:
 
 
 def without_duplicates(tries: Floats, true: Floats) -> Floats:
-    """(j, 9) of each of k boxes its first of m `tries` (k, m, 9) that lies on none of the `true`
-    boxes (n, 9) of its class and picture, and on none of those before it; boxes without such a try
-    are left out.
+    """Return (j, 9) the first free one of the m `tries` (k, m, 9) of each of k boxes. A try is free
+    if it lies on none of the `true` boxes (n, 9) of its class and picture, and on none of those
+    before it. Boxes without a free try are left out.
     """
     shown = true
     for own in tries:

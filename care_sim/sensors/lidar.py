@@ -1,5 +1,5 @@
-"""LiDARs that fire chosen cells, and nothing else: a simulated one, and one whose full scan was
-recorded. And what goes wrong with either: noise, lost returns, dead rows, crosstalk.
+"""LiDARs that fire only chosen cells: a simulated one, and one whose full scan was recorded. Faults
+of both: noise, lost returns, dead rows, crosstalk.
 """
 
 from collections.abc import Callable, Sequence
@@ -101,7 +101,7 @@ def check_dead_rows(grid: Grid, rows: Sequence[int]) -> None:
 
 
 FULL_INTENSITY = 1.0
-"""What a foreign pulse is taken for."""
+"""Intensity of a foreign pulse."""
 
 
 class Crosstalk:
@@ -124,7 +124,7 @@ class Crosstalk:
         self._sweep = RollingSweep(grid, settings.lidar_sweep_s)
         self._random = np.random.default_rng(seed)
 
-    def over_scan(self, scan: Scan, bodies: Integers) -> tuple[Scan, Integers]:
+    def add_to_scan(self, scan: Scan, bodies: Integers) -> tuple[Scan, Integers]:
         """A scan, and the bodies (n,) behind its returns, with the ghosts of this keyframe."""
         ghosts, ranges = self._draw()
         jammed = ghosts[scan.cells]
@@ -137,7 +137,7 @@ class Crosstalk:
         twice = jammed & (np.diff(scan.cells, prepend=-1) == 0)
         return haunted.take(~twice), np.where(jammed, NO_BODY, bodies)[~twice]
 
-    def over_cloud(self, cloud: Cloud, answering: Mask) -> Cloud:
+    def add_to_cloud(self, cloud: Cloud, answering: Mask) -> Cloud:
         """A cloud with the ghosts of this keyframe in those cells that are `answering` (N,)."""
         ghosts, ranges = self._draw()
         cells = np.flatnonzero(ghosts & answering)
@@ -186,8 +186,8 @@ class Lidar:
         self._crosstalk = crosstalk_of(grid, sensing, seed)
 
     def peek(self, sensor: Frame) -> Scan:
-        """What a scan of every cell would return, each fired once, before noise, crosstalk and
-        dropout, which stay undrawn.
+        """Return the scan of every cell, fired once each, without noise, crosstalk and dropout.
+        Draws no random numbers.
         """
         scan, _ = self._cast(np.arange(self.grid.size), sensor)
         if len(scan.cells) > self.grid.size:
@@ -196,8 +196,8 @@ class Lidar:
         return _without(scan, self._faults.dead)
 
     def bodies(self, sensor: Frame) -> Integers:
-        """(N,) the body that every cell, fired once, would hit, NO_BODY for none; as in `peek`
-        nothing is drawn.
+        """Return (N,) the body that every cell, fired once, would hit, NO_BODY for none. Draws no
+        random numbers.
         """
         scan, bodies = self._cast(np.arange(self.grid.size), sensor)
         found = np.full(self.grid.size, NO_BODY)
@@ -207,17 +207,16 @@ class Lidar:
         return found
 
     def hits(self, body: int, cells: Cells, sensor: Frame) -> int:
-        """How many of `cells`, each fired once, would hit a body, before noise, crosstalk and
-        dropout, which stay undrawn.
+        """Count the `cells` that would hit a body, fired once each, without noise, crosstalk and
+        dropout. Draws no random numbers.
         """
         scan, bodies = self._cast(cells, sensor)
         return int(np.count_nonzero((bodies == body) & ~self._faults.dead[scan.cells]))
 
     def fire(self, fired: Cells, sensor: Frame) -> tuple[Scan, Integers]:
-        """Fire the ascending cells `fired` from the frame `sensor`. One that stands there several
-        times is fired as often, and answers once: what its receiver counts adds up.
-
-        Returns the scan, and the body id behind every return for the proxy detector alone.
+        """Fire the ascending cells `fired` from the frame `sensor`. A repeated cell is fired as
+        often and answers once, since its receiver adds up the pulses. Returns the scan, and the
+        body id behind every return, for the proxy detector only.
         """
         cells, shots = shots_by_cell(fired, self.grid.size)
         scan, ids = self._cast(cells, sensor, shots)
@@ -225,7 +224,7 @@ class Lidar:
             measured = self._faults.draw_noisy(scan.ranges, scan.cells, shots)
             scan = replace(scan, ranges=measured)
         if self._crosstalk is not None:
-            scan, ids = self._crosstalk.over_scan(scan, ids)
+            scan, ids = self._crosstalk.add_to_scan(scan, ids)
         lost = self._faults.draw_lost(scan.cells)
         scan = _without(scan, lost)
         if self._beams is not None:
@@ -235,7 +234,7 @@ class Lidar:
     def _cast(
         self, cells: Cells, sensor: Frame, shots: Integers | None = None
     ) -> tuple[Scan, Integers]:
-        """What the cells meet, and the bodies behind it; `shots` as in `Beams.cast`."""
+        """Return the cells' returns and the bodies behind them; `shots` as in `Beams.cast`."""
         if self._beams is not None:
             return self._beams.cast(sensor, cells, shots)
         ranges, ids = self._engine.cast(sensor, cells)
@@ -254,8 +253,8 @@ def _without(scan: Scan, lost: Mask) -> Scan:
 
 
 class RecordedLidar:
-    """A full scan was recorded, and fired cells return their part of it; `CellFaults` and
-    `Crosstalk` are applied to them.
+    """A LiDAR whose full scan was recorded. Fired cells return their part of it, after `CellFaults`
+    and `Crosstalk`.
     """
 
     def __init__(self, grid: Grid, sensing: Sensing, seed: np.random.SeedSequence):
@@ -277,11 +276,11 @@ class RecordedLidar:
             if returned.far is not None:
                 far = self._moved(returned.far, self._faults.draw_noisy_far, shots)
                 returned = replace(returned, far=far)
-        return self._crosstalk.over_cloud(returned, answering) if self._crosstalk else returned
+        return self._crosstalk.add_to_cloud(returned, answering) if self._crosstalk else returned
 
     def peek(self, cloud: Cloud) -> Cloud:
-        """What every cell would return, each fired once, before noise and dropout, which stay
-        undrawn.
+        """Return the returns of every cell, fired once each, without noise and dropout. Draws no
+        random numbers.
         """
         return cloud.of_cells(~self._faults.dead).to_shots()
 

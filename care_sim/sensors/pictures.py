@@ -1,7 +1,7 @@
-"""What a camera without faults shows: the boxes of bodies, read off the visible pixels.
+"""Pictures of a camera without faults: the boxes of bodies, read off the visible pixels.
 
-A table of boxes is (n, 6): the id of a body; left, top, right and bottom of the box that holds all
-its pixels; their number (`care_sim.sensors.engines`).
+A table of boxes is (n, 6): the id of a body, its box (left, top, right, bottom) and its number of
+pixels (`care_sim.sensors.engines`). The box holds all pixels of the body.
 """
 
 from collections.abc import Mapping, Sequence
@@ -37,7 +37,7 @@ FULL_CONFIDENCE = 3 * MIN_PIXELS
 
 Pixels = TypeVar("Pixels", float, Floats)
 
-# Numbers of a module are what compiled code can hold.
+# Compiled code can only read module-level constants.
 _CLASS, _CONFIDENCE = ImageDetections.CLASS, ImageDetections.CONFIDENCE
 _LEFT, _CAMERA = ImageDetections.LEFT, ImageDetections.CAMERA
 _COLUMNS = len(ImageDetections.COLUMNS)
@@ -67,10 +67,8 @@ def class_table(labels: Mapping[int, int]) -> Integers:
 
 
 def faultless_detections(tables: Sequence[Integers], classes: Integers) -> IdentifiedDetections:
-    """What the camera detector reports without faults: a box for every body that has a class in the
-    `class_table` and shows enough pixels.
-
-    `tables` of boxes are one per camera of the rig, in its order.
+    """Return the faultless detections: a box for every body that has a class in the `class_table`
+    and shows enough pixels. `tables` of boxes are one per camera of the rig, in its order.
     """
     parts = [reported_boxes(table, classes, camera) for camera, table in enumerate(tables)]
     rows = np.concatenate([np.empty((0, _COLUMNS)), *(rows for rows, _ in parts)])
@@ -103,7 +101,7 @@ def reported_boxes(table: Integers, classes: Integers, camera: int) -> tuple[Flo
 
 
 @compiled()
-def surest_first(rows: Floats, objects: Integers, least: float) -> tuple[Floats, Integers]:
+def sort_by_confidence(rows: Floats, objects: Integers, least: float) -> tuple[Floats, Integers]:
     """The detections of at least this confidence, the surest first, of equally sure ones the
     leftmost, and the `objects` (n,) behind them.
     """

@@ -1,11 +1,11 @@
-"""What recorded sweeps lose of their returns, and how their ranges err: as two sweeps of real
-LiDARs have it, one of an HDL-32E (nuScenes) and one of two VLP-32C (Argoverse 2).
+"""Lost returns and range errors of recorded sweeps.
 
-Shares of lost returns are by row, of rows that look at the road, so that the range of each is known
-(`docs/examples/sweeps/real_sweeps.py` prints them): 2% where the road is within 12 m, 6% at 18 m,
-11 to 13% from 21 to 38 m, in both sweeps. Errors are those of consecutive returns about the smooth
-line through them: 0.5 cm on the road up to 11 m, 0.8 cm at 17 m and on walls at 25 m. Beyond that,
-surfaces are no longer smooth and errors cannot be told from them.
+The figures come from two sweeps of real LiDARs: one of an HDL-32E (nuScenes) and one of two VLP-32C
+(Argoverse 2). Shares of lost returns are per row, for rows that look at the road, where each range
+is known. Both sweeps lose 2% where the road is within 12 m, 6% at 18 m, and 11 to 13% from 21 to 38
+m. Errors are those of consecutive returns about the smooth line through them. They are 0.5 cm on
+the road up to 11 m, 0.8 cm at 17 m and on walls at 25 m. Farther surfaces are not smooth enough to
+separate errors. The script `docs/examples/sweeps/real_sweeps.py` prints the figures.
 """
 
 from collections.abc import Callable
@@ -41,12 +41,12 @@ KEPT_SPREAD = 0.25
 lie within 0.25 of the middle."""
 FEWEST_KEPT = 0.05
 PASSED = {"car": 0.65, "truck": 0.39, "bus": 0.39, "bicycle": 0.87, "pedestrian": 0.87}
-"""Of the rays that an object does not return, the share that returns from behind it: past a corner
-that its box has and it has not, between legs, through a window. The rest returns nothing. Of the
-rays of the upper VLP-32C of Argoverse 2 through labelled boxes within 50 m, 58% return from the box
-and 27% from behind it for 15 cars, 38 and 54% for five people, 90 and 4% for a bus
-(`docs/examples/sweeps/real_sweeps.py` prints them). A truck has the figure of the bus, a bicycle
-that of people (choice)."""
+"""Share of an object's unreturned rays that return from behind it: past a corner of its box,
+between legs, through a window. The rest returns nothing. Measured on the upper VLP-32C of Argoverse
+2, for rays through labelled boxes within 50 m. 15 cars return 58% from the box and 27% from behind
+it, five people 38 and 54%, a bus 90 and 4%. The script `docs/examples/sweeps/real_sweeps.py` prints
+the figures. A truck has the figure of the bus, a bicycle that of people (choice).
+"""
 _PASSED = np.array([PASSED[name] for name in CLASSES])
 OWN_CAR_SHARES = 0.82, 0.47, 0.26, 0.12, 0.0
 OWN_CAR_DEG = -30.7, -25.3, -24.0, -22.7, -21.3
@@ -75,7 +75,7 @@ def slopes(ego: Floats, rng: np.random.Generator) -> Floats:
     return tilt
 
 
-def as_recorded(
+def add_recorded_losses(
     cloud: Cloud,
     grid: Grid,
     objects: tuple[Integers, Floats],

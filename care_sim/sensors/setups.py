@@ -1,7 +1,7 @@
-"""Sensor set-ups by name or file: those that come with the package, and TOML files alike.
+"""Sensor set-ups by name or TOML file.
 
-The tables and keys of a file are those of `docs/sensors.md`: lengths in metres, angles in degrees,
-places in the frame of the car (x forward, y left, z up; its origin is on the road below the car's
+`docs/sensors.md` lists the tables and keys of a file. Lengths are metres and angles degrees. Places
+are in the frame of the car (x forward, y left, z up; its origin is on the road below the car's
 middle).
 """
 
@@ -24,7 +24,7 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import LIDAR_POSITION, SensorSetup, between
 
 DEFAULT_SETUP = "hdl-32e"
-"""What the paper's data were taken with, and what is mounted where nothing else is said."""
+"""The set-up of the paper's data, and the default."""
 Sensor = str | PathLike[str] | SensorSetup
 """A set-up, its name, or a TOML file of one."""
 
@@ -32,7 +32,7 @@ _SHIPPED = Path(__file__).parent / "shipped"
 _LEAST_VIEW_DEG = round(float(np.rad2deg(LEAST_VIEW)), 6)
 _MOST_TILT_DEG = round(float(np.rad2deg(MOST_TILT)), 6)
 _FOV_DEG = (0.06, 179.9)
-"""What `care_sim.core.pinhole.PinholeCamera` allows, in whole hundredths of a degree."""
+"""Angles that `care_sim.core.pinhole.PinholeCamera` allows, in whole hundredths of a degree."""
 _TABLES = ("name", "lidar", "lidars", "cameras")
 _EQUAL_ROWS = ("rows", "top_deg", "bottom_deg")
 _LIDAR = (
@@ -65,7 +65,7 @@ def setup_names() -> tuple[str, ...]:
 
 
 def sensor_setup(sensor: Sensor) -> SensorSetup:
-    """The set-up that is meant by a name or the path of a TOML file.
+    """Return the set-up of a name or of the path of a TOML file.
 
     Raises InvalidInput for a name that is unknown, a file that is missing or no set-up, and a
     set-up that does not fit together.
@@ -87,8 +87,8 @@ def sensor_setup(sensor: Sensor) -> SensorSetup:
 
 
 def setup_of_columns(row: Mapping[str, Any]) -> str | SensorSetup:
-    """The set-up that `sensor_columns` told. Raises InvalidInput for one that does not come with
-    this version where the columns do not hold it, and for one of another hash.
+    """Return the set-up that `sensor_columns` describe. Raises InvalidInput for one that does not
+    come with this version where the columns do not hold it, and for one of another hash.
     """
     name, digest = row.get("sensor"), row.get("sensor_hash")
     if name is None:
@@ -116,9 +116,9 @@ def setup_lines() -> list[str]:
 
 
 def sensor_columns(sensor: Sensor) -> dict[str, str]:
-    """Columns of a row that tell its set-up by name and hash, and hold one that does not come with
-    the package; none of the default, so that rows and their digests stay as they were before there
-    was a choice.
+    """Return the columns of a row that identify its set-up by name and hash, and store one that
+    does not come with the package. The default set-up has no columns, so that older rows keep their
+    digests.
     """
     # The name alone is enough for nearly every row, and a set-up is compared number by number.
     if sensor == DEFAULT_SETUP:
@@ -141,7 +141,7 @@ def _read(path: Path) -> SensorSetup:
     return _read_once(path, content_digest(path))
 
 
-# Every row of a study asks for the set-up. A file that is written anew has another digest.
+# Every row of a study looks the set-up up. A rewritten file has another digest.
 @lru_cache(maxsize=32)
 def _read_once(path: Path, _digest: str) -> SensorSetup:
     try:

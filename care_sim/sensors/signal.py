@@ -1,21 +1,20 @@
-"""How strong a return is, and whether it is strong enough: the equation of a LiDAR whose beam falls
-whole on a surface that scatters alike in all directions.
+"""Strength of returns, and whether a sensor notices them.
 
-The received power is proportional to rho cos(theta) exp(-2 alpha r) / r^2 with the reflectance rho,
-the angle of incidence theta, the extinction alpha of the air and the range r (Wagner et al. 2006,
-ISPRS Journal 60; with rain, Goodin et al. 2019, Electronics 8, 89). What factor lies before it is
-the sensor's secret. Its data sheet tells the same in other words: the range R at which a target of
-reflectance rho_0 that faces it is still seen. Therefore a return exists where
-
-    rho cos(theta) exp(-2 alpha r) / r^2 >= rho_0 / R^2.
+The equation is that of a LiDAR whose beam falls whole on a surface that scatters alike in all
+directions. The received power is proportional to rho cos(theta) exp(-2 alpha r) / r^2. Here rho is
+the reflectance, theta the angle of incidence, alpha the extinction of the air and r the range.
+Sources: Wagner et al. 2006, ISPRS Journal 60; with rain, Goodin et al. 2019, Electronics 8, 89. The
+constant factor is not published. A data sheet gives the range R at which a target of reflectance
+rho_0 that faces the sensor is still seen. Therefore a return exists where rho cos(theta) exp(-2
+alpha r) / r^2 >= rho_0 / R^2.
 
 An early data sheet of Ouster's OS1 (scribd.com, document 672435817) states 40 m at 10%, 120 m at
 80% and a beam of 2.3 mrad.
 
 A receiver adds up the photons of n shots at a cell (Ouster, US 2023/0243975 A1; AEye,
-RRRWP_19_0812, for several shots at one point). Limited by its own photons, of which it must count
-so many, it needs an nth of the power: the left side counts n times, and in clear air the range
-grows with the square root of n. In sunlight the signal to noise grows with the root of the shots
+RRRWP_19_0812, for several shots at one point). A receiver that is limited by its own photons needs
+a fixed count, so it needs an nth of the power: the left side counts n times, and in clear air the
+range grows with the square root of n. In sunlight the signal to noise grows with the root of the shots
 (Vaisala, CL61 user guide M212475EN), so the range grows with the fourth root of n. Pile-up (Gupta
 et al. 2019, Photon-Flooded Single-Photon 3D Cameras) is left out.
 
@@ -48,10 +47,9 @@ class Signal:
         self._least = settings.lidar_stated_reflectance / stated**2 if stated else 0.0
 
     def intensities(self, brightness: Floats, ranges: Floats) -> Floats:
-        """(n,) what returns from surfaces of a `brightness` (n,), reflectance times cosine of the
-        incidence, at `ranges` (n,), as if all were at one range: 0 to 1, 0 for an infinite range.
-
-        So sensors tell it that calibrate their intensities. The air between is not taken out.
+        """Return (n,) intensities, 0 to 1, as if all surfaces were at one range. `brightness` (n,)
+        is reflectance times cosine of the incidence. An infinite range in `ranges` (n,) gives 0.
+        Sensors with calibrated intensities report them so. The loss in the air stays in.
         """
         # Without air between, exp(-0 * inf) would be no number.
         met = np.isfinite(ranges)
@@ -101,9 +99,9 @@ def rain_extinction(rain_mm_h: float) -> float:
 def brightness(
     parts: Primitives, origins: Floats, rays: Floats, ranges: Floats, bodies: Integers
 ) -> Floats:
-    """(n,) reflectance times cosine of the angle of incidence (Lambert) where unit `rays` (n, 3)
-    from `origins` (n, 3) or (3,) met `bodies` (n,) at `ranges` (n,), all in the world as it stands
-    now; 0 where they met nothing.
+    """Return (n,) reflectance times cosine of the angle of incidence (Lambert), 0 without a hit.
+    Unit `rays` (n, 3) from `origins` (n, 3) or (3,) met `bodies` (n,) at `ranges` (n,), all in the
+    world as it stands now.
     """
     # What was met and has no parts is the road: level, so that the slope of a ray is its angle.
     solid = np.isin(bodies, parts.tables[-1])
@@ -121,7 +119,7 @@ def brightness(
 
 
 SEPARATION_M = 1.0
-"""Surfaces are told apart from this distance on (Velodyne, VLP-16 manual, dual returns)."""
+"""Least distance between surfaces with separate returns (Velodyne, VLP-16 manual, dual returns)."""
 _EDGE_ON = 1e-12
 """The intensity of a surface that is met edge-on, so that its place still counts."""
 
@@ -178,10 +176,8 @@ def echoes_of(ranges: Floats, intensities: Floats, bodies: Integers) -> Echoes:
 
 
 def reported(echoes: Echoes, kept: str) -> Echoes:
-    """What a sensor reports of the echoes that keeps `strongest`, `last` or `both`.
-
-    Where the strongest is also the last, `both` has the second strongest beside it (Velodyne,
-    VLP-16 manual, page 57).
+    """Return the echoes that a sensor reports: the `strongest`, the `last` or `both`. If the
+    strongest is also the last, `both` adds the second strongest (Velodyne, VLP-16 manual, page 57).
     """
     power = echoes.intensities / echoes.ranges**2
     if kept == STRONGEST:

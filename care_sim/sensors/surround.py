@@ -1,4 +1,4 @@
-"""Six cameras and a LiDAR around the car: all that can be measured of a world at one time.
+"""Six cameras and a LiDAR around the car, which measure a world at one time.
 
 The ring is that of nuScenes (Caesar et al. 2020, Fig. 4): front and sides 70 degrees wide and 55
 degrees apart, the back 110 degrees wide, at the places of one of its calibrations, seen from
@@ -67,9 +67,9 @@ def surround_detections(
     labels: Mapping[int, int],
     boxes: Floats,
 ) -> IdentifiedDetections:
-    """What `views` show of the bodies that `labels` maps to classes; `objects` are body ids.
-
-    `boxes` (n, 7) are those of the bodies in the frame `sensor`; nothing outside them is rendered.
+    """Return the detections in `views` of the bodies that `labels` maps to classes; `objects` are
+    body ids. `boxes` (n, 7) are those of the bodies in the frame `sensor`. Nothing outside them is
+    rendered.
     """
     tables = []
     for view in views:
@@ -86,12 +86,12 @@ def full_sweep(
     height_m: float,
     up: Floats | None = None,
 ) -> Cloud:
-    """The returns of every cell, fired from the frame `sensor`.
+    """Return a full sweep from the frame `sensor`. `objects` are body ids; the road is NO_BODY, or
+    the world's ground where it has one. `boxes` (n, 7) in the sensor frame hold all bodies.
 
-    `objects` are body ids; for the road NO_BODY, or the world's ground where it has one. `boxes`
-    (n, 7) in the sensor frame hold all bodies. Rays are cast where these are. All others can only
-    meet the road, a plane `height_m` below the sensor and parallel to its x, y plane, or at a right
-    angle to `up` (3,) in the sensor frame. In a world without ground the road hides nothing.
+    Rays are cast only where boxes are. All other rays can only meet the road, a plane `height_m`
+    below the sensor. The plane is parallel to the sensor's x, y plane, or at a right angle to `up`
+    (3,) in the sensor frame. In a world without ground the road hides nothing.
     """
     parts = [_own_sweep(world, head, sensor, boxes, height_m, up) for head in grid.heads]
     cells, ranges, bodies = map(np.concatenate, zip(*parts, strict=True))

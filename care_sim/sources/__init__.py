@@ -1,1 +1,1 @@
-"""Where films come from: generated streets, Argoverse 2 logs and nuScenes databases."""
+"""Sources of films: generated streets, Argoverse 2 logs and nuScenes databases."""

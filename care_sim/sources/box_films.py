@@ -1,5 +1,5 @@
-"""Films of annotated boxes, and what every recording of boxes needs: the boxes as bodies of a
-world, what its sensors make of them, and the car's own motion.
+"""Films of annotated boxes: the boxes as bodies of a world, their sensor data, and the car's own
+motion.
 """
 
 from collections.abc import Mapping, Sequence
@@ -37,16 +37,18 @@ from care_sim.sources.film_checks import (
     ValueRange,
     check_film,
     check_span,
-    tell_other_frame,
+    report_other_frame,
 )
 from care_sim.world.bodies import sized
 from care_sim.world.bullet import BulletWorld
 
 SPAN_S = 0.5
-"""How far back the poses count: a keyframe. At 10 Hz these are six poses, which average out the
-centimetres by which recorded poses err. Longer spans lag behind a driver who begins to brake."""
+"""Span of earlier poses that count: a keyframe. At 10 Hz these are six poses, which average out the
+centimetres of error of recorded poses. Longer spans lag behind a driver who begins to brake.
+"""
 LEAST_POSES = 3
-"""The fewest poses that tell a steady acceleration without lag. At 2 Hz they reach back a second.
+"""The fewest poses that give a steady acceleration without lag. At 2 Hz they reach back a
+second.
 """
 
 
@@ -219,7 +221,7 @@ def film_of_boxes(
         given.append((frame, annotations))
         annotated = annotations.take(_is_shown(annotations, pictures, cloud))
         shots.append(Shot(time_s, f"{name}/{len(shots)}", frame, ego, annotated, pictures, cloud))
-    tell_other_frame(name, given)
+    report_other_frame(name, given)
     first, everyone = shots[0], given[0][1]
     film = Film(
         name,

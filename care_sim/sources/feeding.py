@@ -1,6 +1,4 @@
-"""How many sweeps of a film a detector is fed at a keyframe where the user names no number: as many
-as the detector asks for.
-"""
+"""Sweeps per keyframe that a detector gets by default: its own number."""
 
 from dataclasses import fields, replace
 from typing import Any
@@ -15,9 +13,9 @@ _OPTION = "sweeps"
 
 
 def source_for(source: Source, detector: str, parameters: Any, sweeps: int | None = None) -> Source:
-    """Return the source with as many sweeps per keyframe as a detector with some `parameters` asks
-    for, or as it is where the user named a number of `sweeps`. Where the source has no sweeps
-    between its keyframes, print one line.
+    """Return the source with the number of sweeps per keyframe of a detector with `parameters`. A
+    number of `sweeps` from the user leaves the source as it is. Prints a line if the source has no
+    sweeps between its keyframes.
 
     Raises as `care_sim.perception.detectors.make_detector` does.
     """
@@ -29,7 +27,7 @@ def source_for(source: Source, detector: str, parameters: Any, sweeps: int | Non
         return fed
     report_once(
         f"{source.kind} holds no sweeps between its keyframes: detector {detector} gets 1 per "
-        f"keyframe, and asks for {wanted}"
+        f"keyframe, and wants {wanted}"
     )
     return source
 

@@ -1,7 +1,7 @@
-"""Bounds of what a recording can hold, alike for every source, and the description of a film.
+"""Bounds of a recording's values, the same for every source, and the description of a film.
 
-The ranges are wide. What lies beyond them is damage. Further on it would become infinities and NaN,
-or a body that ends Bullet (a round one without a radius does).
+The ranges are wide, and values beyond them are damage. Later they would become infinities and NaN,
+or a body that crashes Bullet (such as a round one without a radius).
 """
 
 from collections.abc import Sequence
@@ -52,8 +52,8 @@ def check_span(path: Path | str, seconds: float) -> None:
 
 
 def quaternion_fault(turns: Floats, has_heading: bool = True) -> tuple[int, str] | None:
-    """The first of quaternions (n, 4: x, y, z, w) that turns nothing, or leaves no heading where
-    there must be one: its row, and what is wrong with it.
+    """Return the row and the fault of the first quaternion (n, 4: x, y, z, w) without a rotation,
+    or without a required heading.
     """
     # Clipped, since squares of large numbers overflow.
     lengths = np.linalg.norm(np.clip(turns, -2, 2), axis=1)
@@ -71,7 +71,7 @@ def quaternion_fault(turns: Floats, has_heading: bool = True) -> tuple[int, str]
 
 
 LEAST_KEYFRAMES = 3
-"""Fewer tell neither an acceleration nor a first sighting that a track follows."""
+"""Fewer keyframes give neither an acceleration nor a first sighting that a track follows."""
 FULL_TURN = 2 * np.pi + 1e-6
 MOVES_M = 5.0
 """The car must move so far in the life of an object, or nothing is known of the object's frame."""
@@ -90,8 +90,8 @@ _FRAMES = {
 
 
 def check_film(film: Any, recorded: bool = False) -> None:
-    """Raise InvalidInput for what is no film, or holds what no scene can hold. A film of what was
-    `recorded` must annotate something.
+    """Raise InvalidInput for anything but a film, or impossible content. A `recorded` film must
+    annotate something.
 
     Print a line where most boxes seem to be given in another frame.
     """
@@ -109,10 +109,10 @@ def check_film(film: Any, recorded: bool = False) -> None:
         _check_shot(film, shot)
     if recorded and not any(len(shot.annotations) for shot in film.shots):
         raise InvalidInput(f"{film.name}: no {', no '.join(CLASSES)} in any of its keyframes")
-    tell_other_frame(film.name, [(shot.sensor, shot.annotations) for shot in film.shots])
+    report_other_frame(film.name, [(shot.sensor, shot.annotations) for shot in film.shots])
 
 
-def tell_other_frame(name: str, seen: Sequence[tuple[Frame, Annotations]]) -> None:
+def report_other_frame(name: str, seen: Sequence[tuple[Frame, Annotations]]) -> None:
     """Print a line where most boxes seem to be given in another frame. `seen` are the frame of the
     LiDAR and the annotations in it, per keyframe.
     """
@@ -215,7 +215,7 @@ def _other_frame(seen: Sequence[tuple[Frame, Annotations]]) -> str:
     return next((name for name, boxes in others if standing(boxes) > MOST_ASTRAY), "")
 
 
-def tell_empty_boxes(
+def report_empty_boxes(
     name: str, every: Sequence[Annotations], filled: Sequence[Mask], range_m: float
 ) -> None:
     """Print once how many boxes of a scene hold no recorded point, and how many newcomers there are

@@ -1,5 +1,5 @@
 """The kinds of recordings, and sources of other packages, by an entry of the group
-`care_sim.sources` or by place. Whatever is wrong with one is told with its name.
+`care_sim.sources` or by place. Every error names its source.
 """
 
 import inspect
@@ -39,7 +39,7 @@ RECORDING_KINDS: dict[str, type[Recordings]] = {
 RECORDING_TEXTS = tuple(
     name if made.shipped else f"{name}:FOLDER" for name, made in RECORDING_KINDS.items()
 )
-"""How each kind is asked for."""
+"""The text of each kind."""
 
 
 def recordings(text: str, options: Mapping[str, object] | None = None) -> Recordings:
@@ -105,8 +105,8 @@ def source_names() -> list[str]:
     return SOURCES.names()
 
 
-def means_source(place: str) -> bool:
-    """Whether a place names a class of sources, even one with faults."""
+def is_source_place(place: str) -> bool:
+    """Return True if a place names a class of sources, even one with faults."""
     try:
         return _is_source(replace(SOURCES, faults=lambda _: ()).maker(place))
     except InvalidInput:
@@ -201,7 +201,7 @@ class Installed:
             raise InvalidInput(f"source {self.name}: {error}") from error
         # Foreign code may raise anything; some leaves by `sys.exit`.
         except BaseException as error:
-            # What ours stumbles over was made by its class.
+            # Errors of our code come from objects that its class made.
             kind: Any = SOURCES.maker(self.name)
             place = "" if foreign_place(error) else class_place(kind)
             raise BrokenSource(f"source {self.name} {what}: {error_line(error)}{place}") from error

@@ -208,11 +208,13 @@ def _camera_poses(path: Path) -> list[_Pose]:
 
 
 def _oxts_poses(path: Path, calibration: Path) -> list[_Pose]:
-    """Return the poses of the camera on a car whose inertial unit wrote a line per frame: latitude,
-    longitude (degrees), altitude (metres), roll, pitch, yaw (radians; yaw 0 is east), and more.
+    """Return the poses of the camera on a car whose inertial unit wrote a line per frame. A line
+    has latitude and longitude (degrees), altitude (metres), roll, pitch and yaw (radians; yaw 0 is
+    east), and more.
 
     Mercator's projection at the latitude of the first frame, as in `convertOxtsToPose.m` of KITTI's
-    development kit for raw data: x = s r lon, y = s r ln tan(pi / 4 + lat / 2), s = cos(lat_0).
+    development kit for raw data. It is x = s r lon, y = s r ln tan(pi / 4 + lat / 2), s =
+    cos(lat_0).
     """
     imu_turn, imu_place = _camera_from_imu(calibration)
     poses = []

@@ -1,8 +1,8 @@
 """Sources by a text: generated streets, recordings in a folder, and those of other packages.
 
-An entry of the group `care_sim.sources` names a class of `Recordings`, which is asked for as
-NAME:FOLDER, or one of `Generated`, asked for as NAME. Either is asked for by its place, too, as
-MODULE:CLASS:FOLDER or MODULE:CLASS.
+An entry of the group `care_sim.sources` names a class of `Recordings`, with the text NAME:FOLDER,
+or of `Generated`, with the text NAME. Either can also be named by its place, MODULE:CLASS:FOLDER or
+MODULE:CLASS.
 """
 
 import inspect
@@ -28,9 +28,9 @@ from care_sim.sources.scenes import SPLITS, Recorded, Source, Streets
 
 
 def source_of(text: str, **options: object) -> Source:
-    """The source that a text names: `streets`, one of `care_sim.sources.installed.RECORDING_TEXTS`,
-    or one of another package, with `options` of its kind (`split`, and the fields of its class);
-    those that are None are not given.
+    """Return the source that a text names: `streets`, one of
+    `care_sim.sources.installed.RECORDING_TEXTS`, or one of another package. `options` are those of
+    its kind (`split`, and the fields of its class); None means not given.
 
     Raises InvalidInput for another text, a folder that is none, an option that the kind does not
     have, a source that cannot be loaded.
@@ -50,7 +50,9 @@ def source_name(text: str) -> str:
 
 
 def replayed_source(text: str, **options: object) -> Source:
-    """The same, of what `CARE-Replay-v0` plays: all but `streets`, which have their own."""
+    """Return a source that `CARE-Replay-v0` plays: all but `streets`, which have their own
+    environment.
+    """
     name, folder = _parted(text) if isinstance(text, str) else ("", "")
     if not _is_foreign(name):
         return Recorded(recordings(text, options))
@@ -58,7 +60,7 @@ def replayed_source(text: str, **options: object) -> Source:
     try:
         return Installed(name, folder, tuple(given.items()))
     except InvalidInput as error:
-        # A slip in the name of a kind, `nuscene:FOLDER`, looks like a place.
+        # A misspelt kind, `nuscene:FOLDER`, looks like a place.
         if is_place(name) and find_spec(name.partition(":")[0].partition(".")[0]) is None:
             raise _unknown(text) from error
         raise
@@ -107,7 +109,7 @@ def source_lines() -> Iterator[str]:
 
 
 def _source_lines(name: str) -> list[str]:
-    """A source as it is asked for and its parameters, or why it cannot be loaded."""
+    """Return a source's text and its parameters, or why it cannot be loaded."""
     package = "" if name in SOURCES.built_in else f" [{package_of(SOURCES.entry(name))}]"
     try:
         source: Any = SOURCES.maker(name)
@@ -121,7 +123,7 @@ def _source_lines(name: str) -> list[str]:
         *(
             f"    {field.name}={option_text(field.default)}"
             for field in fields(source)
-            # The folder is told behind the name.
+            # The folder follows the name.
             if field.name != "folder"
         ),
     ]

@@ -1,4 +1,4 @@
-"""Recorded drives in a folder: what a kind of recordings must tell."""
+"""Recorded drives in a folder: the interface of a kind of recordings."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -17,13 +17,13 @@ class Recordings(ABC):
     """
 
     kind: ClassVar[str] = ""
-    """What a built-in one is called; one of another package is called by its entry or place."""
+    """Name of a built-in kind; a foreign one is named by its entry or place."""
     shipped: ClassVar[Path | None] = None
-    """The folder of recordings that come with the package, which are called by their kind alone."""
+    """The folder of shipped recordings, which are named by their kind only."""
     suffixes: ClassVar[tuple[str, ...]] = ()
     """Ends of files that may stand for the folder."""
     licence: ClassVar[str] = ""
-    """The licence of the recordings, as a card of weights tells it."""
+    """The licence of the recordings, for cards of weights."""
     folder: Path
 
     @abstractmethod
@@ -35,8 +35,8 @@ class Recordings(ABC):
         """The film of a scene by name."""
 
     def files(self, scene: str) -> list[Path]:
-        """Return all files and folders that `film` reads, missing ones included: a play is played
-        again after one of them has changed. By default that is the whole folder.
+        """Return all files and folders that `film` reads, missing ones included, by default the
+        whole folder. A play is repeated after one of them has changed.
         """
         return [self.folder]
 
@@ -52,9 +52,9 @@ class Recordings(ABC):
         return DEFAULT_SETUP
 
     def columns(self) -> dict[str, Any]:
-        """Columns of a row that tell how the recordings are read, where it is not the usual way."""
+        """Return the columns of a row for unusual options of reading."""
         return {}
 
     def scene_columns(self, scene: str) -> dict[str, Any]:
-        """Columns that tell how a scene is read, where it is not the usual way."""
+        """Return the columns of a row for unusual options of reading a scene."""
         return {}

@@ -35,7 +35,7 @@ class Scene(NamedTuple):
 
 
 class Source(Protocol):
-    """Where scenes come from."""
+    """A source of scenes."""
 
     def __hash__(self) -> int: ...
 
@@ -65,8 +65,8 @@ class Source(Protocol):
         """Name the drive that a scene was cut from."""
 
     def row(self, scene: Scene) -> dict[str, Any]:
-        """Columns that tell where a scene comes from: the kind of the source, and of recordings a
-        hash of the files that it is read from, wherever they lie.
+        """Return the columns of a scene's origin: the kind of the source, and for recordings a hash
+        of their files, at any place.
         """
 
 
@@ -207,7 +207,7 @@ class Recorded:
 
 
 LONGEST_NUMBER = 40
-"""Digits that are read of a number of scenes. Python refuses to read some thousands."""
+"""Most digits of a number of scenes. Python refuses to read thousands."""
 SPLITS = {"evaluation": EVALUATION_SEEDS, "calibration": CALIBRATION_SEEDS}
 
 
@@ -225,9 +225,9 @@ def _film_of(source: Source, scene: Scene, _stamps: tuple[Stamp, ...]) -> Film:
 
 
 def chosen_scenes(scenes: list[Scene], names: tuple[str, ...]) -> list[Scene]:
-    """The scenes that are asked for. One whole number means that many, from the first, unless a
-    scene is called so. Otherwise they are names, and without any all scenes are meant. Raises
-    InvalidInput for a name or a number that there is not.
+    """Return the chosen scenes. One whole number means that many, from the first, unless it is a
+    scene's name. Otherwise texts are names; no text means all scenes. Raises InvalidInput for an
+    unknown name or a number that is too large.
     """
     if not names:
         return scenes
@@ -247,7 +247,7 @@ def chosen_scenes(scenes: list[Scene], names: tuple[str, ...]) -> list[Scene]:
 
 
 def _is_number(text: str) -> bool:
-    """Whether it was meant as a number, be it of scenes or not."""
+    """Return True if the text is meant as a number."""
     try:
         float(text[:LONGEST_NUMBER])
     except ValueError:

@@ -22,7 +22,7 @@ from care_sim.loops.film import Film, Shot
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud, IdentifiedDetections, cloud_of
 from care_sim.sensors.beams import Beams
 from care_sim.sensors.engines import make_engine
-from care_sim.sensors.recorded_errors import as_recorded, slopes
+from care_sim.sensors.recorded_errors import add_recorded_losses, slopes
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.sensors.signal import Signal
 from care_sim.sensors.surround import (
@@ -40,31 +40,32 @@ from care_sim.world.bullet_bodies import MOST_PARTS
 from care_sim.world.motions import LinearMotion, rates_between
 
 SIGHT_M = 60.0
-"""Bodies whose hull is further than this from the sensor are left out, unless its LiDAR reaches
-further: the default one reaches 50 m, and an adult shows its camera the least number of pixels at
-about 50 m."""
+"""Bodies with a farther hull are left out, unless the LiDAR reaches farther. The default one
+reaches 50 m, and an adult at about 50 m has the least number of camera pixels.
+"""
 
 _DEFAULT = sensor_setup(DEFAULT_SETUP)
 _ENGINE = "bullet"
-"""What casts the rays of every film, so that films of all settings differ by these alone."""
+"""Engine of every film, so that films differ only by their settings."""
 _CLUTTER_ENGINE = "fast"
-"""That of cluttered streets: their thousands of parts take Bullet and its pictures ten times as
-long. Both engines agree (`make parity`)."""
+"""Engine of cluttered streets: with their thousands of parts Bullet and its pictures take ten times
+as long. Both engines agree (`make parity`).
+"""
 SUNK_M = 1000.0
-"""How far below the road bodies are while rays pass by them: no LiDAR reaches there."""
+"""Depth below the road of bodies that rays ignore: no LiDAR reaches there."""
 _NO_CLASS = -1
 """The class of a body that the five classes do not hold."""
 
 
 def record(street: Street, setup: SensorSetup = _DEFAULT, returns: FilmedReturns = RAYS) -> Film:
-    """The film of a street, taken by a sensor set-up whose pulses return by `returns`.
-    `Cloud.objects` and `Annotations.objects` are the columns of `street.poses`.
+    """Return the film of a street, taken by a sensor set-up with the return model `returns`. The
+    columns of `street.poses` are `Cloud.objects` and `Annotations.objects`.
 
     An object is annotated at a keyframe if a return of the full sweep lies on it or a camera shows
-    it. nuScenes is alike: it scores what has at least one LiDAR or radar point. Nobody could have
-    seen what is wholly hidden. The street knows those too: who is wholly hidden at its first
-    keyframe is in `Film.hidden`. Whatever returns, the same are annotated: those whom plain rays or
-    a camera meet. Raises InvalidInput for a pose that is not finite.
+    it. Similarly nuScenes scores objects with at least one LiDAR or radar point. Wholly hidden
+    objects cannot be seen. Those hidden at the first keyframe are in `Film.hidden`. The annotations
+    do not depend on the return model: they hold the objects that plain rays or a camera meet.
+    Raises InvalidInput for a pose that is not finite.
     """
     check_filmed(returns)
     columns = [f"{kind} (column {number})" for number, kind in enumerate(street.kinds)]
@@ -92,8 +93,8 @@ def _check_poses(street: Street, names: Sequence[str], poses: Floats) -> None:
 
 
 def check_filmed(returns: FilmedReturns) -> None:
-    """Raise InvalidInput where one film does not tell what every number of shots returns: which
-    echo is the last depends on how many are noticed, and which is the strongest does not.
+    """Raise InvalidInput if one film cannot serve every number of shots: the last echo depends on
+    the number of noticed ones, the strongest does not.
     """
     if returns.most_shots > 1 and returns.lidar_returns != STRONGEST:
         raise InvalidInput(
@@ -144,14 +145,14 @@ class _StreetBodies:
         self._engine_name = _CLUTTER_ENGINE if returns.clutter else _ENGINE
         self._engine = make_engine(self._engine_name, world, setup.grid)
         self._clutter = [*street.clutter]
-        # Nothing but the street decides, so that every policy meets the same losses.
+        # Only the street decides, so that every policy meets the same losses.
         self._rng = np.random.default_rng(int(street.digest()[:16], 16))
         self._bright = self._rng.uniform(-1.0, 1.0, len(street.kinds))
         level = np.zeros((len(street.ego), 2))
         self._slopes = slopes(street.ego, self._rng) if returns.clutter else level
 
     def shot(self, keyframe: int, cameras: tuple[PinholeCamera, ...]) -> tuple[Shot, Annotations]:
-        """Everything that can be seen at a keyframe, and who is near and cannot."""
+        """Return everything visible at a keyframe, and the near hidden objects."""
         street = self._street
         x, y, yaw = street.ego[keyframe].tolist()
         pitch, roll = self._slopes[keyframe].tolist()
@@ -179,7 +180,7 @@ class _StreetBodies:
         if self._returns.clutter:
             objects = self._classes, self._bright
             behind = partial(self._behind, keyframe, sensor, numbers)
-            cloud = as_recorded(cloud, self._setup.grid, objects, behind, self._rng)
+            cloud = add_recorded_losses(cloud, self._setup.grid, objects, behind, self._rng)
         annotations, hidden = (
             Annotations(labelled[kept], self._classes[labelled[kept]], boxes[kept])
             for kept in (shown, ~shown)

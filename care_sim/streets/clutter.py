@@ -1,9 +1,9 @@
-"""Clutter: what stands beside a street besides houses, hedges and parked vehicles, who walks in
-groups, and bicycles in racks. It is drawn last and finds room between all else.
+"""Clutter beside a street: small objects, walking groups, and bicycles in racks. Clutter is drawn
+last and fills remaining room.
 
-Bodies that perception does not report are `Street.clutter`. Groups and parked bicycles are
-reported, and so are bodies like any other. Nothing of it stands where anybody walks or drives:
-kerbs and verges are ground, and people walk on them.
+Bodies that perception does not report are `Street.clutter`. Groups and parked bicycles are reported
+like other bodies. Clutter never blocks anybody's way: kerbs and verges are ground, and people walk
+on them.
 """
 
 from collections.abc import Callable, Iterator
@@ -26,16 +26,16 @@ from care_sim.streets.people import (
 from care_sim.world.bodies import BodyKind
 
 Placed = tuple[BodyKind, Pose]
-"""A body that is not reported, and where it stands: x, y, heading."""
+"""An unreported body and its pose: x, y, heading."""
 
 PIECE_M = 4.0
-"""Pieces of pavement and verge: in the tightest bend they are 7 cm off the line."""
+"""Length of a piece of pavement and verge: in the tightest bend it is 7 cm off the line."""
 LOWERED_CHANCE = 0.15
-"""Of a piece of kerb (choice): a drive every 27 m."""
+"""Chance of a lowered piece of kerb (choice): a drive every 27 m."""
 UNEVEN_M = -0.01, 0.0, 0.01
-"""By which neighbouring pieces differ (choice)."""
+"""Spread between neighbouring pieces (choice)."""
 CLEARANCE_M = 0.05
-"""Between the kerb and the parking lane's edge, so that pieces in a bend stay off it."""
+"""Gap between the kerb and the parking lane's edge, so that pieces in a bend stay off it."""
 TREES_APART_M: Range = (8.0, 16.0)
 """Street trees of small to middling crowns are planted 8 to 15 m apart (GALK)."""
 TREE_OFF_KERB_M = 0.6
@@ -64,30 +64,32 @@ RELIEF_APART_M: Range = (0.5, 4.0)
 """Windows, doors and bays of a front (choice)."""
 
 GROUPS_PER_100M = 1.0
-"""Of people on one pavement; with the single walkers seven in ten of those in sight belong to one,
-at a middling density (Moussaid et al. 2010, PLoS ONE 5: up to 70%)."""
+"""Groups per 100 m of pavement. Including single walkers, seven in ten visible people belong to
+one, at medium density (Moussaid et al. 2010, PLoS ONE 5: up to 70%).
+"""
 GROUP_SIZES = {2: 0.71, 3: 0.21, 4: 0.06, 5: 0.02}
 """James 1953, American Sociological Review 18: freely forming groups of pedestrians."""
 ABREAST_M: Range = (0.6, 0.85)
-"""Between the middles of two who walk together (Moussaid et al. 2010: 0.78 m on average)."""
+"""Distance of two people who walk together (Moussaid et al. 2010: 0.78 m on average)."""
 STANDING_SHARE = 0.4
-"""Of groups: of people in nuScenes 28% stand or sit, and those who talk or wait are groups
-(choice)."""
+"""Share of standing groups: of people in nuScenes 28% stand or sit, and those who talk or wait are
+groups (choice).
+"""
 RACKS_PER_100M = 0.6
-"""Of 2 to 6 bicycles: some two bicycles on 100 m (choice)."""
+"""Racks of 2 to 6 bicycles: about two bicycles on 100 m (choice)."""
 RACK_APART_M: Range = (0.6, 0.9)
 """FGSV, Hinweise zum Fahrradparken: 0.8 m between bicycles of one height, less in old racks."""
 
 
-def strew(draft: Draft, roads: list[tuple[Road, Span]]) -> tuple[Placed, ...]:
-    """Draw the clutter of roads over their spans (metres along each). Groups and parked bicycles
-    join the bodies of the draft; the rest is returned.
+def place_clutter(draft: Draft, roads: list[tuple[Road, Span]]) -> tuple[Placed, ...]:
+    """Draw the clutter of roads over their spans (metres along each). Adds groups and parked
+    bicycles to the draft, and returns the rest.
     """
     placed: list[Placed] = []
     for road, span in roads:
         for side in road.sides:
             beside = _Beside(draft, road, side, span)
-            # Ground first: it takes no room. Then from what has the fewest places to what has most.
+            # Ground first: it takes no room. Then kinds with the fewest possible places first.
             placed += beside.ground()
             placed += beside.row(bodies.lamp, LAMPS_APART_M, OFF_KERB_M)
             if draft.rng.random() < EVEN_CHANCE:
@@ -129,7 +131,7 @@ class _Beside:
                 yield from self._ground(piece, s, side.front_m - side.garden_m / 2)
 
     def _ground(self, kind: BodyKind, s: float, away: float) -> Iterator[Placed]:
-        """A piece of ground, unless something must stay free there: a side street, its corners."""
+        """Return a piece of ground, unless the place must stay free: a side street, its corners."""
         pose = self._pose(s + PIECE_M / 2, away, 0.0)
         if self._draft.is_ground(pose, kind.size[:2]):
             yield kind, _triple(pose)
@@ -161,11 +163,11 @@ class _Beside:
                 yield from self._put(self._one(make), s, away, draw(self._rng, (-0.2, 0.2)))
 
     def front(self) -> Iterator[Placed]:
-        """Yield what juts out of the house fronts."""
+        """Yield parts that jut out of the house fronts."""
         s = self._span[0]
         while s < self._span[1]:
             kind = self._one(bodies.relief)
-            # Half of it is in the wall, so that it needs no room but on the pavement.
+            # Half of the part is in the wall, so it needs room only on the pavement.
             pose = self._pose(s, self._side.front_m, 0.0)
             if not self._draft.is_way(pose, kind.size[:2]):
                 yield kind, _triple(pose)
@@ -206,7 +208,7 @@ class _Beside:
         turns = 2 * np.pi * np.arange(size) / size + draw(rng, (-np.pi, np.pi))
         found = False
         for turn in turns.tolist():
-            # They face the middle of their round.
+            # They face the middle of their circle.
             pose = self._pose(s + radius * np.cos(turn), away + radius * np.sin(turn), turn + np.pi)
             found |= self._draft.stand("pedestrian", pose)
         return found
@@ -236,7 +238,7 @@ class _Beside:
         return every[int(self._rng.integers(len(every)))]
 
     def _places(self, per_100m: float) -> Iterator[float]:
-        """Places along the road, so many on 100 m on average."""
+        """Draw places along the road, with this mean number per 100 m."""
         length = self._span[1] - self._span[0]
         yield from self._rng.uniform(
             *self._span, self._rng.poisson(per_100m * length / 100)
@@ -247,13 +249,13 @@ class _Beside:
         return draw(self._rng, (side.kerb_m + keep, side.boundary_m - keep))
 
     def _pose(self, s: float, away: float, heading: float) -> Floats:
-        """The pose (3,) of a body whose y axis leads from the road outwards at heading 0."""
+        """Return the pose (3,) of a body whose y axis points away from the road at heading 0."""
         sign = self._side.sign
         turn = heading if sign > 0 else heading + np.pi
         return self._road.curve.to_world(np.array([s, sign * away, turn]))
 
     def _put(self, kind: BodyKind, s: float, away: float, heading: float = 0.0) -> Iterator[Placed]:
-        """A body that stands, if there is room for it."""
+        """Place a standing body, if there is room."""
         pose = self._pose(s, away, heading)
         if self._draft.occupy(pose, kind.size[:2]):
             yield kind, _triple(pose)

@@ -1,11 +1,11 @@
-"""The bodies of clutter: kerbs and verges, vegetation, poles and signs, what juts out of walls.
+"""The bodies of clutter: kerbs and verges, vegetation, poles and signs, parts of walls.
 
-None is reported. All are made of upright boxes and cylinders, which both engines cast: a slope is a
-flight of low steps, a bush or a crown a heap of leafy boxes with gaps between them. Sizes are in
-metres. Each number has its source or the word "choice" beside it.
+None is reported. All are made of upright boxes and cylinders, which both engines cast. A slope is a
+flight of low steps, a bush or a crown a heap of leafy boxes with gaps. Sizes are in metres. Each
+number has its source or the word "choice" beside it.
 
-Of each kind there are `VARIANTS`, drawn once for all streets: what an engine works out of a body it
-keeps, and a street of a thousand different ones would take it seconds.
+Each kind has `VARIANTS`, drawn once for all streets. Engines cache bodies, and a street of a
+thousand different ones would take seconds.
 """
 
 from collections.abc import Callable
@@ -38,14 +38,17 @@ STEP_M = 0.4
 
 BUSH_RADIUS_M: Range = (0.35, 1.1)
 BUSH_HEIGHT_M: Range = (0.5, 2.0)
-"""From ground cover to what hides a garden (choice); neighbours ask for less than 2 m."""
+"""From ground cover to hedges that hide a garden (choice); neighbour law allows less than 2 m."""
 CLUMP_M: Range = (0.15, 0.5)
 """Side of a clump of leaves in a bush (choice)."""
 TRUNK_M: Range = (0.15, 0.5)
-"""Across: from a planted street tree (16 to 18 cm round is the least, FLL) to a grown one."""
+"""Diameter of a trunk: from a planted street tree (at least 16 to 18 cm round, FLL) to a grown
+one.
+"""
 CROWN_FROM_M: Range = (1.5, 4.5)
-"""Above a carriageway 4.5 m stay clear, above a pavement 2.5 m (RASt 06), but nobody cuts every
-tree: over the pavement of the sweep of Argoverse 2 a crown hangs to 1.6 m."""
+"""Clearance above a carriageway is 4.5 m, above a pavement 2.5 m (RASt 06). Not every tree is cut:
+a crown in the sweep of Argoverse 2 hangs to 1.6 m.
+"""
 CROWN_RADIUS_M: Range = (1.2, 3.2)
 CROWN_CLUMP_M: Range = (0.3, 0.9)
 CROWN_CLUMPS = 40
@@ -55,13 +58,14 @@ BED_CHANCE = 0.5
 BED_M: Range = (2.0, 4.0)
 BED_WIDTH_M: Range = (0.6, 1.1)
 BED_HEIGHT_M: Range = (0.3, 0.9)
-"""Plants at the foot of every second tree (choice). Open ground of 6 m^2 about a street tree is
-asked for (FLL); the tree of the sweep of Argoverse 2 stands in plants 3 m long and 0.9 m high."""
+"""Plants at the foot of every second tree (choice). FLL requires open ground of 6 m^2 about a
+street tree. The tree in the sweep of Argoverse 2 has plants 3 m long and 0.9 m high.
+"""
 BED_CLUMPS = 6
 
 LAMP_M: Range = (0.12, 0.2)
 SIGN_POST_M = 0.076
-"""Across: a usual sign post of 76 mm."""
+"""Diameter of a usual sign post, 76 mm."""
 SIGN_FROM_M = 2.2
 SIGN_M: Range = (0.42, 0.75)
 """A sign hangs this high above a pavement (VwV-StVO, Sec. 39) and is 42 to 75 cm wide (sizes 1 to

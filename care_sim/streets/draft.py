@@ -1,6 +1,4 @@
-"""A street while it is being drawn: what stands and moves where, and whether there is room for
-more.
-"""
+"""A street in progress: standing and moving bodies, and tests of free room."""
 
 import math
 
@@ -17,7 +15,7 @@ Footprint = tuple[float, float]
 def footprints_meet(
     poses: Floats, size: Floats, others: Floats, other_sizes: Floats, gap: Floats
 ) -> Mask:
-    """(n,) whether rectangles come closer than `gap` (n,) along every axis (separating axis
+    """Return (n,) whether rectangles come closer than `gap` (n,) along every axis (separating axis
     theorem).
 
     `poses` (n, 3) and `others` (n, 3) are x, y, heading; `size` and `other_sizes` (n, 2) length and
@@ -45,19 +43,19 @@ def _each_meets(
 def meets_any(
     way: Floats, size: Footprint, ways: Floats, bounds: Floats, sizes: Floats, berths: Floats
 ) -> bool:
-    """Whether a footprint on `way` (1 or t, 3) ever comes closer than its berth to one of others,
+    """Return True if a footprint on `way` (1 or t, 3) ever comes closer than its berth to others,
     along every axis.
 
-    These are on `ways` (n, 1 or t, 3), within `bounds` (n, 4) as `way_bounds` gives them; they have
-    `sizes` (n, 2) and `berths` (n,). A way of one pose is that of what stands.
+    The others are on `ways` (n, 1 or t, 3), within `bounds` (n, 4) of `way_bounds`, with `sizes`
+    (n, 2) and `berths` (n,). Standing bodies have a way of one pose.
     """
     left, low, right, high = way_bounds(way)
     times = max(len(way), ways.shape[1])
     for n in range(len(ways)):
-        # First by what holds the whole ways, then by centres: that leaves few pairs for the exact
-        # test. Rectangles that touch have centres no farther apart than half of both diagonals. The
-        # exact test moves every side out by the berth, and a corner then moves by sqrt(2) berths at
-        # most, at a right angle.
+        # First by bounds of whole ways, then by centres, which leaves few pairs for the exact test.
+        # Rectangles that touch have centres no farther apart than half of both diagonals. The exact
+        # test moves every side out by the berth, and a corner then moves by sqrt(2) berths at most,
+        # at a right angle.
         diagonals = math.hypot(sizes[n, 0], sizes[n, 1]) + math.hypot(size[0], size[1])
         reach = diagonals / 2 + math.sqrt(2) * berths[n]
         across = max(bounds[n, 0] - right, left - bounds[n, 2])
@@ -107,8 +105,8 @@ def _reach(heading: float, size: Floats | Footprint, angle: float) -> float:
 
 
 STEP_S = 0.1
-"""Between two samples of a way. A car at 30 km/h moves 0.8 m meanwhile, so nobody can step through
-one between two samples.
+"""Seconds between samples of a way. A car at 30 km/h moves 0.8 m meanwhile, so nobody can step
+through a car between samples.
 """
 STREET_KEYFRAME_S = 0.5
 KEYFRAMES = 40
@@ -118,8 +116,8 @@ TIMES: Floats = STEP_S * np.arange(round(KEYFRAMES * STREET_KEYFRAME_S / STEP_S)
 
 
 class PlacedBodies:
-    """Footprints with their ways, a row each in tables that grow. A way is (1, 3) for what stands,
-    else (t, 3); all have one length.
+    """Footprints with their ways, a row each in tables that grow. A way is (1, 3) for standing
+    bodies, else (t, 3); all have one length.
     """
 
     def __init__(self) -> None:
@@ -129,7 +127,7 @@ class PlacedBodies:
         self._berths: Floats = np.empty(0)
 
     def add(self, way: Floats, size: Footprint, berth: float) -> None:
-        """One more footprint, which others pass at `berth` metres or more."""
+        """Add a footprint, which others pass at `berth` metres or more."""
         ways = self._ways if len(self._ways) else np.empty((0, *way.shape))
         self._ways = np.concatenate([ways, way[None]])
         self._bounds = np.vstack([self._bounds, way_bounds(way)])
@@ -144,9 +142,9 @@ class PlacedBodies:
 
 
 TOUCH_M = 0.01
-"""Things that stand may come as close as this."""
+"""Smallest gap of standing bodies."""
 SQUEEZE_M = 0.15
-"""Least room of a walker on each side of a gap between things that stand: a hand's breadth."""
+"""Least room of a walker on each side of a gap between standing bodies: a hand's breadth."""
 
 
 class Draft:
@@ -164,31 +162,35 @@ class Draft:
         self._reserved = PlacedBodies()
 
     def reserve(self, pose: Floats, size: Footprint) -> None:
-        """Keep a rectangle free of everything that stands: a carriageway, a junction."""
+        """Keep a rectangle free of standing bodies: a carriageway, a junction."""
         self._reserved.add(pose.reshape(1, 3), size, 0.0)
 
     def obstruct(self, way: Floats, size: Footprint, berth: float) -> None:
-        """Let walkers keep clear of a way (t, 3) on which no body of the draft moves: the ego's."""
+        """Keep walkers off a way (t, 3) that no body of the draft uses: the ego's."""
         self._moving.add(way, size, berth)
 
     def has_room(self, pose: Floats, size: Footprint) -> bool:
-        """Whether a rectangle at a pose (3,) is free of all there is, now and later."""
+        """Return True if a rectangle at a pose (3,) is always free."""
         way = pose.reshape(1, 3)
         kept = self._reserved, self._fixed, self._moving
         return not any(bodies.meets(way, size) for bodies in kept)
 
     def is_ground(self, pose: Floats, size: Footprint) -> bool:
-        """Whether nothing must stay free in a rectangle at a pose (3,): there may be a kerb."""
+        """Return True if no part of a rectangle at a pose (3,) is reserved, so that a kerb may be
+        there.
+        """
         return not self._reserved.meets(pose.reshape(1, 3), size)
 
     def is_way(self, pose: Floats, size: Footprint) -> bool:
-        """Whether a rectangle at a pose (3,) must stay free or anybody ever comes through it."""
+        """Return True if a rectangle at a pose (3,) is reserved or anybody ever passes through
+        it.
+        """
         way = pose.reshape(1, 3)
         return self._reserved.meets(way, size) or self._moving.meets(way, size)
 
     def occupy(self, pose: Floats, size: Footprint) -> bool:
-        """Take a rectangle at a pose (3,) for something that stands, if there is room. Says whether
-        there was.
+        """Take a rectangle at a pose (3,) for a standing body. Returns False if there is no
+        room.
         """
         if not self.has_room(pose, size):
             return False
@@ -196,18 +198,16 @@ class Draft:
         return True
 
     def stand(self, kind: str, pose: Floats) -> bool:
-        """Put a body at a pose (3,) if there is room. Says whether there was."""
+        """Put a body at a pose (3,). Returns False if there is no room."""
         if not self.occupy(pose, _footprint(kind)):
             return False
         self._keep(kind, np.repeat(pose.reshape(1, 3), len(self.times), axis=0))
         return True
 
     def move(self, kind: str, way: Floats, berth: float) -> bool:
-        """Let a body follow a way (t, 3) if nothing ever stands or passes there. Says whether it
-        could.
-        """
+        """Let a body follow a way (t, 3). Returns False if the way is not always free."""
         size = _footprint(kind)
-        # What stands must leave room on both sides. What moves has a berth of its own.
+        # Standing bodies must leave room on both sides. Moving bodies have their own berth.
         if self._fixed.meets(
             way, (size[0] + 2 * SQUEEZE_M, size[1] + 2 * SQUEEZE_M)
         ) or self._moving.meets(way, size):
@@ -216,7 +216,7 @@ class Draft:
         return True
 
     def drive(self, kind: str, way: Floats, berth: float) -> None:
-        """Let a body follow a way (t, 3) that is known to be free: traffic that minds itself."""
+        """Let a body follow a way (t, 3) that is known to be free: traffic avoids itself."""
         self._moving.add(way, _footprint(kind), berth)
         self._keep(kind, way)
 

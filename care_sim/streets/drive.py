@@ -1,9 +1,8 @@
-"""A drive: a street with the way that the ego takes through it, and whom it meets. Pure data, drawn
-from a seed.
+"""A drive: a street with the ego's route through it, and its encounters. Pure data, drawn from a
+seed.
 
 The street is that of `care_sim.streets.street`, with layouts, furniture and people from the same
-ranges. But nobody crosses a road by chance: every crossing is one of `encounters`, and who walks
-else stays on the pavements.
+ranges. But all crossings are `encounters`; other walkers stay on the pavements.
 """
 
 from collections.abc import Iterator, Sequence
@@ -38,14 +37,14 @@ from care_sim.world.bodies import CATALOGUE
 from care_sim.world.route import Route, SpeedPlan, through
 
 BESIDE_M = 0.3
-"""Kept free on either side of who comes."""
+"""Free room on either side of a comer, metres."""
 VIEW_M = 0.6
-"""Kept free along every line of sight: twice what is to be seen of who comes."""
+"""Free width along every line of sight: twice the visible part of a comer."""
 
 
 def keep_room(draft: Draft, encounter: Encounter) -> bool:
-    """Put up the occluder and keep free of what stands the way of who comes, and the lines along
-    which the ego sees them. Says whether there was room; without it nothing is changed.
+    """Put up the occluder, and keep the comer's way and the ego's lines of sight free of standing
+    bodies. Returns False, and changes nothing, if there is no room.
     """
     length, width, _ = CATALOGUE[encounter.who].size
     s = encounter.s
@@ -75,23 +74,23 @@ def keep_walkers_off(
     encounters: Sequence[Encounter],
     span: Span,
 ) -> None:
-    """Let nobody else walk or cycle where the ego drives over pavements, cycle lanes and
-    carriageways, nor through those who are met. `span` is that of the main road.
+    """Keep other walkers and cyclists off the ego's way over pavements, cycle lanes and
+    carriageways, and off the comers. `span` is that of the main road.
     """
     main = plan.main
     kept = []
     if plan.joinings:
-        # Who walks along a side street would else go on straight over the main road.
+        # Otherwise walkers along a side street would cross the main road.
         kept.append(_rectangle(main.curve, span, (-main.right.lane_edge_m, main.left.lane_edge_m)))
     if turned_into is not None:
         side, road = main.side(turned_into.sign), turned_into.road
         mouth = (-road.right.kerb_m, road.left.kerb_m)
-        # With the cycle lane: nobody who cycles along the main road is to give way to the ego.
+        # With the cycle lane, so that cyclists along the main road need not give way to the ego.
         kept.append(_rectangle(road.curve, (side.lane_edge_m, side.boundary_m), mouth))
     for one in encounters:
         length, width, _ = CATALOGUE[one.who].size
         to_d = one.from_d - one.side * one.walk.length_m
-        # A car drives over both pavements; who walks only comes to stand on the far one.
+        # A car drives over both pavements; a walker stops on the far one.
         from_d = one.from_d if one.who == "car" else to_d
         beyond = np.sign(to_d - from_d) * length / 2 if from_d != to_d else length / 2
         ends = from_d - beyond, to_d + beyond
@@ -101,49 +100,55 @@ def keep_walkers_off(
 
 
 def _rectangle(curve: Curve, along: Span, across: Span) -> tuple[Floats, Footprint]:
-    """The world pose (3,) and the footprint of a rectangle on a road: from where to where along its
-    line, and to its left.
+    """Return the world pose (3,) and the footprint of a rectangle on a road, given by its ends
+    along the line and to its left.
     """
     middle = np.array([sum(along) / 2, sum(across) / 2, 0.0])
     return curve.to_world(middle), (abs(along[1] - along[0]), abs(across[1] - across[0]))
 
 
 CRUISE_MPS: Range = (7.0, SPEED_LIMIT_MPS)
-"""From what the slowest of the other drivers want to the limit."""
+"""Speeds from the slowest other drivers' wanted speed to the limit."""
 LENGTH_M: Range = (160.0, 260.0)
-"""Of the way: 20 to 35 s when nothing holds the ego up, room for three encounters."""
+"""Length of the way: 20 to 35 s of free driving, room for three encounters."""
 TURN_RADIUS_M = {-1: 7.0, 1: 10.0}
-"""To the right and to the left, where the ego turns off: both above the 5.5 m that a passenger car
-can turn within, with the room of a lane to the kerb."""
+"""Radius of a right and of a left turn. Both exceed the 5.5 m of a passenger car, with the room of
+a lane to the kerb.
+"""
 TURN_CHANCE = 0.75
-"""Where there is a side street, so that one drive in four turns off, as many as go round a bend."""
+"""Chance of turning off at a side street: one drive in four turns off, as many as go round a
+bend.
+"""
 FIRST_M = 40.0
 APART_M = 42.0
 SHIFT_M: Range = (0.0, 12.0)
 """Places of encounters: five seconds of approach before the first, so that every track settles, and
-as much between two, less what each is shifted by.
+equally much between two, minus random shifts.
 """
 MOUTH_M = 22.0
-"""On the main road no encounter is this near to the middle of a side street, whose mouth must be
-clear.
+"""Least distance of an encounter on the main road from the middle of a side street, whose mouth
+must be clear.
 """
 EXIT_M = 12.0
-"""Where the ego turns off, who comes crosses the side street this far behind the main road's
-pavement or less: as in Euro NCAP's turning tests (CPTA), 8 to 11 m from its lane, up to the first
-lorry that may park."""
+"""Largest distance of a comer's crossing from the main road's pavement, if the ego turns off. As in
+Euro NCAP's turning tests (CPTA), 8 to 11 m from its lane, up to the first lorry that may park.
+"""
 SIDEWAYS_MPS2 = 2.0
-"""Through a bend: two thirds of the 3 m/s^2 that UN Regulation 79 allows automated steering."""
+"""Sideways acceleration in a bend: two thirds of the 3 m/s^2 that UN Regulation 79 allows automated
+steering.
+"""
 COMFORT_MPS2 = 1.5
-"""Slowing for a bend and gaining speed after it: as the controller gains speed after braking."""
+"""Acceleration before and after a bend, as of the controller after braking."""
 SAMPLE_S = 0.2
-"""Between two samples of a walker's way: nobody on a pavement moves further than half of its own
-length in it."""
+"""Seconds between samples of a walker's way: nobody on a pavement moves more than half of its own
+length meanwhile.
+"""
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """Part of the way: the ego goes along `road` from `from_m` to `to_m` of its route, and its s on
-    the road is the route's less `offset_m`.
+    """Part of the way: the ego is on `road` from `from_m` to `to_m` of its route. Its s on the road
+    is the route's minus `offset_m`.
     """
 
     road: Road
@@ -154,11 +159,11 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Drive:
-    """Everything that is drawn for a drive.
+    """All draws of a drive.
 
-    The ego goes `goal_m` along the route of its `plan`. `kinds` (n,) stand or walk on `ways`
-    (n, t, 3), sampled every SAMPLE_S seconds. `encounters` are in the order of the route.
-    `stretches` say which road the ego drives on.
+    The ego goes `goal_m` along the route of its `plan`. `kinds` (n,) stand or walk on `ways` (n, t,
+    3), sampled every SAMPLE_S seconds. `encounters` are in the order of the route. `stretches` are
+    the roads of the ego's way.
     """
 
     plan: SpeedPlan
@@ -176,10 +181,10 @@ def draw_drive(
     wanted: Wanted = ANYBODY,
     turn_chance: float = TURN_CHANCE,
 ) -> Drive:
-    """A drive of at most `duration_s` seconds that holds `wanted` encounters, and with
-    `turn_chance` turns off where there is a side street. Nothing outside the generator enters.
+    """Draw a drive of at most `duration_s` seconds with `wanted` encounters. It turns off with
+    `turn_chance` if there is a side street. The draw depends only on the generator.
     """
-    # Each part has a stream of its own, so that a change in one does not draw the others anew.
+    # Each part has its own stream, so that a change of one leaves the others' draws.
     plans, meeting, traffic, furniture, people = (
         np.random.default_rng(child)
         for child in np.random.SeedSequence(rng.integers(2**32, size=4).tolist()).spawn(5)
@@ -209,7 +214,7 @@ def draw_drive(
 
 
 def _turned_into(rng: np.random.Generator, plan: Plan, chance: float) -> Joining | None:
-    """The side street that the ego turns into, if it does."""
+    """Return the side street that the ego turns into, if any."""
     if not plan.joinings or rng.random() >= chance:
         return None
     return plan.joinings[int(rng.integers(len(plan.joinings)))]
@@ -218,7 +223,7 @@ def _turned_into(rng: np.random.Generator, plan: Plan, chance: float) -> Joining
 def _way(
     plan: Plan, turned_into: Joining | None, length: float
 ) -> tuple[Route, tuple[Stretch, ...]]:
-    """The ego's route, about `length` long, and the roads that it goes along."""
+    """Return the ego's route, about `length` long, and its roads."""
     curve = plan.main.curve
     if turned_into is None:
         legs = [
@@ -257,11 +262,11 @@ def _encounters(
     places = [
         place + draw(rng, SHIFT_M) for place in np.arange(FIRST_M, goal - SHIFT_M[1], APART_M)
     ]
-    # How many is drawn evenly: in a quarter of the drives there is nothing to brake for.
+    # The number is uniform: a quarter of the drives has nothing to brake for.
     number = min(int(rng.choice(wanted.most + 1)), len(places))
     corner = _corner(rng, plan, stretches)
     spots = [*corner, *_others(places, corner, plan, stretches)]
-    # All are drawn, then as many are taken as there shall be and have room: first at the corner.
+    # All are drawn, then taken while they have room, up to the number, the corner first.
     order = [*range(len(corner)), *(len(corner) + rng.permutation(len(spots) - len(corner)))]
     found: list[Encounter] = []
     for spot in (spots[place] for place in order):
@@ -277,7 +282,7 @@ def _encounters(
 def _corner(
     rng: np.random.Generator, plan: Plan, stretches: tuple[Stretch, ...]
 ) -> tuple[Spot, ...]:
-    """Where the ego turns off, the mouth of the side street; else in its bend, if there is one."""
+    """Return the mouth of the side street if the ego turns off, else the bend, if there is one."""
     main, *into = stretches
     if into:
         (leaving,) = into
@@ -296,9 +301,7 @@ def _corner(
 def _others(
     places: list[float], corner: tuple[Spot, ...], plan: Plan, stretches: tuple[Stretch, ...]
 ) -> Iterator[Spot]:
-    """Where else along the way somebody can be met: away from the corner, and from the mouths of
-    streets.
-    """
+    """Return other spots along the way: away from the corner, and from the mouths of streets."""
     apart = APART_M - SHIFT_M[1]
     for along in places:
         if any(one.along_m[0] - apart < along < one.along_m[1] + apart for one in corner):
@@ -321,8 +324,8 @@ def _lanes(
     last: float,
     duration_s: float,
 ) -> tuple[DrivenLane, ...]:
-    """All lanes that somebody drives in. Where the ego turns left, nobody comes towards it: giving
-    way is not asked of it.
+    """Return all lanes with traffic. If the ego turns left, no lane is oncoming, so that the ego
+    need not give way.
     """
     sides = {joining.sign: drive_side_street(rng, plan, joining) for joining in plan.joinings}
     own = [drive_own_lane(rng, plan, last)]

@@ -1,9 +1,8 @@
-"""Drivers: the ego on its script, highway-env traffic on every road, and the flow that fills the
-lanes.
+"""Drivers: the scripted ego, highway-env traffic on every road, and the flow that fills the lanes.
 
-Each road has a traffic of its own, because highway-env's cost grows with the square of the vehicles
-on a road. It drives on a straight line, which is then laid along the road's curve. In a bend the
-lane beside the reference line is a few per cent longer or shorter than the straight one.
+Each road has its own traffic, because highway-env's cost grows with the square of the vehicles.
+Traffic drives on a straight line, which is then bent along the road. In a bend the lane beside the
+reference line is a few per cent longer or shorter than the straight one.
 """
 
 from dataclasses import dataclass, replace
@@ -46,27 +45,26 @@ FLOW_PER_H: Range = (200.0, 400.0)
 both directions of a collector street. Their spacing is exponential beyond HEADWAY_S (Cowan 1975).
 """
 SIDE_FLOW_PER_H: Range = (50.0, 200.0)
-"""In a side street: up to half of the 400 per hour that RASt 06 gives for both directions of a
+"""Flow of a side street: up to half of the 400 per hour that RASt 06 gives for both directions of a
 residential street. Drives go through residential streets and take this flow on every road.
 """
 HEADWAY_S = 3.0
-"""Least time between vehicles: what the IDM drivers keep in equilibrium at 30 km/h, so that nobody
-brakes at once.
+"""Least time between vehicles: the equilibrium of IDM drivers at 30 km/h, so that nobody brakes at
+once.
 """
 DRIVER_MPS: Range = (7.0, SPEED_LIMIT_MPS)
-"""What oncoming drivers want in a 30 km/h zone. Those in the ego's lane keep the limit: the ego
-does not react, and none of them may hold it up."""
+"""Wanted speeds of oncoming drivers in a 30 km/h zone. Drivers in the ego's lane keep the limit,
+since the ego does not react and must not be held up.
+"""
 TRAFFIC_KINDS = {"car": 0.78, "van": 0.08, "truck": 0.08, "bus": 0.06}
 """Shares in moving traffic. Annotations of nuScenes with attribute moving or stopped: 161 thousand
 cars, 33 thousand trucks (which cover vans: half each), 13 thousand buses."""
 VEHICLE_BERTH_M = 0.5
-"""What people on foot or bicycle leave at least between themselves and a driving vehicle."""
+"""Least distance of people on foot or bicycle from a driving vehicle."""
 LEAD_M: Range = (28.0, 60.0)
-"""From the ego to the next vehicle ahead: beyond the gap that the IDM wants at 30 km/h."""
+"""Gap to the next vehicle ahead: above the IDM's wanted gap at 30 km/h."""
 BEYOND_M = 70.0
-"""The street is inhabited this far before the ego's first and beyond its last place: sight ends at
-50 m.
-"""
+"""Extent of the street before the ego's first and beyond its last place: sight ends at 50 m."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +83,7 @@ def ego_speeds(rng: np.random.Generator) -> Floats:
     cruise = draw(rng, EGO_CRUISE_MPS)
     halts = rng.random() < EGO_HALT_CHANCE
     begins = draw(rng, EGO_HALT_AT_S)
-    # All is drawn even if the ego does not halt, so that the draws after it stay the same.
+    # Everything is drawn even if the ego does not halt, so that later draws stay the same.
     ends = begins + cruise / EGO_BRAKING_MPS2 + draw(rng, EGO_HALT_S)
     speeds = [cruise]
     for time in TIMES[:-1]:
@@ -117,20 +115,20 @@ def drive_main(draft: Draft, plan: Plan) -> Drive:
 
 
 def drive_joining(draft: Draft, joining: Joining, main: Road) -> None:
-    """Drive a side street's traffic. Some leave along it. Some come up to the main road, give way
-    and wait before its pavement.
+    """Drive a side street's traffic. Some vehicles leave along it. Others come up to the main road,
+    give way and wait before its pavement.
     """
     road = joining.road
     nearest = main.side(joining.sign).boundary_m
     traffic = Traffic(
         road.directions, ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=SPEED_LIMIT_MPS
     )
-    leaving = flow_places(draft.rng, SIDE_FLOW_PER_H, nearest + 5.0, BEYOND_M)
-    coming = flow_places(draft.rng, SIDE_FLOW_PER_H, nearest + 25.0, 2 * BEYOND_M)
+    leaving = draw_flow(draft.rng, SIDE_FLOW_PER_H, nearest + 5.0, BEYOND_M)
+    coming = draw_flow(draft.rng, SIDE_FLOW_PER_H, nearest + 25.0, 2 * BEYOND_M)
     drivers = [_driver(draft, traffic, s, 0) for s in leaving] + [
         _driver(draft, traffic, s, 1) for s in coming
     ]
-    # The line is where the middle of the first vehicle stops with its bumper before the pavement.
+    # The line is the middle of the first vehicle that stops with its bumper before the pavement.
     if coming:
         first = CATALOGUE[drivers[len(leaving)][0]]
         traffic.add_stop_line(nearest + first.size[0] / 2, 1)
@@ -145,25 +143,24 @@ Driver = tuple[str, RoadVehicle]
 
 def _queue(draft: Draft, traffic: Traffic, reach: float) -> list[Driver]:
     """Return the vehicles that drive along with the ego, ahead of it and behind."""
-    ahead = flow_places(draft.rng, FLOW_PER_H, draw(draft.rng, LEAD_M), reach + BEYOND_M)
-    behind = [-s for s in flow_places(draft.rng, FLOW_PER_H, draw(draft.rng, LEAD_M), BEYOND_M)]
+    ahead = draw_flow(draft.rng, FLOW_PER_H, draw(draft.rng, LEAD_M), reach + BEYOND_M)
+    behind = [-s for s in draw_flow(draft.rng, FLOW_PER_H, draw(draft.rng, LEAD_M), BEYOND_M)]
     return [_driver(draft, traffic, s, 0, SPEED_LIMIT_MPS) for s in ahead + behind]
 
 
 def _oncoming(draft: Draft, traffic: Traffic, reach: float) -> list[Driver]:
-    """Return the vehicles that come towards the ego, from as far as they can still meet it."""
+    """Return oncoming vehicles, up to the distance from which they still meet the ego."""
     farthest = reach + BEYOND_M + SPEED_LIMIT_MPS * float(TIMES[-1])
     return [
-        _driver(draft, traffic, s, 1)
-        for s in flow_places(draft.rng, FLOW_PER_H, -BEYOND_M, farthest)
+        _driver(draft, traffic, s, 1) for s in draw_flow(draft.rng, FLOW_PER_H, -BEYOND_M, farthest)
     ]
 
 
-def flow_places(
+def draw_flow(
     rng: np.random.Generator, flow_per_h: Range, first: float, last: float
 ) -> list[float]:
-    """Places along a lane, from `first` to `last`, of vehicles that flow at the speed limit."""
-    # Cowan's headway: a least one, and an exponential rest with the mean that the flow asks for.
+    """Draw places along a lane, from `first` to `last`, of vehicles at the speed limit."""
+    # Cowan's headway: a least one, plus an exponential rest with the flow's mean.
     mean_s = 3600.0 / draw(rng, flow_per_h)
     places = []
     place = first + rng.exponential(mean_s - HEADWAY_S) * SPEED_LIMIT_MPS
@@ -182,13 +179,13 @@ def _driver(
 
 
 def traffic_kind(rng: np.random.Generator) -> str:
-    """The kind of a vehicle that drives."""
+    """Draw the kind of a driving vehicle."""
     return str(rng.choice(list(TRAFFIC_KINDS), p=list(TRAFFIC_KINDS.values())))
 
 
 def _run(traffic: Traffic, vehicles: list[RoadVehicle], ego_speeds: Floats | None = None) -> Floats:
-    """(t, n, 3) road places of vehicles at every sample; the first one is the ego when it has
-    speeds.
+    """Return (t, n, 3) road places of vehicles at every sample; with speeds the first one is the
+    ego.
     """
     ways = np.empty((len(TIMES), len(vehicles), 3))
     for sample in range(len(TIMES)):
@@ -216,17 +213,17 @@ def _drive(curve: Curve, way: Floats, speeds: Floats) -> Drive:
 
 SLOW_LEAD_M: Range = (22.0, 27.0)
 SLOW_LEAD_MPS: Range = (5.6, DRIVER_MPS[0])
-"""Somebody who looks for a place to park, at 20 to 25 km/h, starts as far ahead as IDM drivers keep
-at that speed, or a little more; nobody else starts that near.
+"""Gap to a slow vehicle ahead, which looks for a place to park at 20 to 25 km/h: the IDM gap at
+that speed, or a little more. No other vehicle starts that near.
 """
 
 
 @dataclass(frozen=True)
 class DrivenLane:
-    """A lane at `d` metres left of its road's line, led along it (`direction` +1) or against it.
+    """A lane `d` metres left of its road's line, along it (`direction` +1) or against it.
 
-    `places` (n,) are metres the way its vehicles drive, s or -s, ascending; `speeds` are m/s.
-    `stop_m` is where the first gives way, inf where nobody need.
+    `places` (n,) are metres in driving direction, s or -s, ascending; `speeds` are m/s. `stop_m` is
+    where the first vehicle gives way, inf if it need not.
     """
 
     curve: Curve
@@ -247,12 +244,12 @@ class DrivenLane:
 
 
 def drive_own_lane(rng: np.random.Generator, plan: Plan, reach_m: float) -> DrivenLane:
-    """The ego's lane, which it drives for `reach_m`: who drives ahead of it, and behind. In half of
-    the drives the one ahead is near, and slow.
+    """Draw the vehicles ahead and behind in the ego's lane, which the ego drives for `reach_m`. In
+    half of the drives the vehicle ahead is near and slow.
     """
     slow_lead = draw(rng, SLOW_LEAD_M), draw(rng, SLOW_LEAD_MPS)
-    ahead = flow_places(rng, SIDE_FLOW_PER_H, draw(rng, LEAD_M), reach_m + BEYOND_M)
-    behind = [-s for s in flow_places(rng, SIDE_FLOW_PER_H, draw(rng, LEAD_M), BEYOND_M)]
+    ahead = draw_flow(rng, SIDE_FLOW_PER_H, draw(rng, LEAD_M), reach_m + BEYOND_M)
+    behind = [-s for s in draw_flow(rng, SIDE_FLOW_PER_H, draw(rng, LEAD_M), BEYOND_M)]
     lane = _lane(rng, plan.main.curve, 0.0, 1, [*behind[::-1], *ahead])
     if rng.random() >= EVEN_CHANCE:
         return lane
@@ -266,21 +263,23 @@ def drive_own_lane(rng: np.random.Generator, plan: Plan, reach_m: float) -> Driv
 
 
 def drive_oncoming_lane(rng: np.random.Generator, plan: Plan, from_m: float) -> DrivenLane:
-    """The lane beside it: who comes towards the ego, from `from_m` along the road on."""
-    places = flow_places(rng, SIDE_FLOW_PER_H, -from_m, BEYOND_M)
+    """Draw the oncoming vehicles of the next lane, from `from_m` along the road on."""
+    places = draw_flow(rng, SIDE_FLOW_PER_H, -from_m, BEYOND_M)
     return _lane(rng, plan.main.curve, LANE_WIDTH_M, -1, places)
 
 
 def drive_side_street(
     rng: np.random.Generator, plan: Plan, joining: Joining
 ) -> tuple[DrivenLane, DrivenLane]:
-    """A side street: who leaves along it, and who comes up to the main road and waits there."""
+    """Draw the vehicles of a side street: those leaving along it, and those waiting at the main
+    road.
+    """
     nearest = plan.main.side(joining.sign).boundary_m
     curve = joining.road.curve
-    leaving = flow_places(rng, SIDE_FLOW_PER_H, nearest + 25.0, 2 * BEYOND_M)
-    coming = [-s for s in flow_places(rng, SIDE_FLOW_PER_H, nearest + 25.0, 2 * BEYOND_M)][::-1]
-    # Drivers keep the standing gap before what stands: the first one, of whatever kind, stops with
-    # its bumper before the pavement.
+    leaving = draw_flow(rng, SIDE_FLOW_PER_H, nearest + 25.0, 2 * BEYOND_M)
+    coming = [-s for s in draw_flow(rng, SIDE_FLOW_PER_H, nearest + 25.0, 2 * BEYOND_M)][::-1]
+    # Drivers keep the standing gap before an obstacle: the first vehicle of any kind stops with its
+    # bumper before the pavement.
     stop = STANDING_GAP_M - nearest - CATALOGUE["bus"].size[0] / 2
     return (
         _lane(rng, curve, 0.0, 1, leaving),

@@ -1,17 +1,17 @@
 """Encounters in a drive: people and vehicles that come out into the ego's way, drawn from stated
 ranges.
 
-Each has a line across the road, a body that hides who waits there, and an outcome for an ego that
-drives on as it means to: a conflict, a near miss, or a stop at the edge of the carriageway. Who
-waits sets off when the ego is a drawn time away, so that a conflict stays one after earlier
-braking.
+Each encounter has a line across the road, a body that hides the waiting comer, and a result for an
+ego that drives on as planned. Results are a conflict, a near miss, or a stop at the edge of the
+carriageway. The comer sets off when the ego is a drawn time away, so that a conflict stays one
+after earlier braking.
 
-All is reckoned along the way that the ego means to drive, with its speeds and through its bends and
-turns. Who comes is in sight for at most `MOST_SIGHT_S` before an ego that drives on would hit them,
-and for no less than an ego needs that brakes at once, as a full scan lets it: 0.2 s (two keyframes,
-the second of which tells a velocity), 0.3 s until the brake acts and v / b to stand, of which it
-drives half: 1.33 s of its way at 30 km/h and 0.9 s at the 4 m/s of a turn, with b = 5 m/s^2. So
-nearly all can be prevented; and a second more is what sensing may lose.
+Everything is computed along the ego's planned way, with its speeds, bends and turns. A comer is in
+sight for at most `MOST_SIGHT_S` before an ego that drives on would hit the comer. It is in sight at
+least as long as an ego with a full scan needs to brake. That is 0.2 s (two keyframes, the second of
+which gives a velocity), 0.3 s until the brake acts, and half of v / b. With b = 5 m/s^2 this is
+1.33 s at 30 km/h and 0.9 s at the 4 m/s of a turn. So nearly all conflicts can be prevented, and
+sensing may lose up to a second.
 """
 
 from dataclasses import dataclass
@@ -35,25 +35,25 @@ from care_sim.world.bodies import CATALOGUE
 from care_sim.world.motions import Walk
 
 GAP_M: Range = (0.4, 0.8)
-"""Between the occluder's end and who passes it: about half a step, as in the dart-out."""
+"""Gap between the occluder's end and a comer: about half a step, as in the dart-out."""
 AT_KERB = {
     "child": (("car", "van", "truck"), ("skip", "trailer", "hoarding")),
     "pedestrian": (("van", "truck", "bus"), ("trailer", "hoarding")),
 }
-"""Who comes out between what stands at the kerb: behind what perception reports, and behind what it
-does not. A car or a skip is lower than an adult.
+"""Comers between bodies at the kerb: behind reported occluders, and behind unreported ones. A car
+or a skip is lower than an adult.
 """
 AT_GARDEN = ("wall", "hedge", "hoarding")
 AT_YARD = ("building",)
-"""What stands between pavement and garden, and beside an entrance to a yard where the houses stand
-at the pavement; perception reports none of it.
+"""Occluders between pavement and garden, and beside an entrance to a yard if houses are at the
+pavement; perception reports none of them.
 """
 
 
 @dataclass(frozen=True)
 class Spot:
-    """A part of the way where somebody may be met, `within_m` metres along `road`; the ego's place
-    on its route is the road's and `offset_m`.
+    """A part of the way for an encounter, `within_m` metres along `road`. The ego's place on its
+    route is the road's plus `offset_m`.
 
     On a side street `beside` is the side of the main road at which it begins. At a `corner` the ego
     has just turned into it.
@@ -67,14 +67,14 @@ class Spot:
 
     @property
     def along_m(self) -> Range:
-        """From where to where it lies along the route."""
+        """Return its begin and end along the route."""
         return self.within_m[0] + self.offset_m, self.within_m[1] + self.offset_m
 
 
 @dataclass(frozen=True)
 class Hiding:
-    """An `occluder` at a world `pose`. Who waits behind it comes out along the line across the road
-    at `s`, and shows beyond `edge_m` from the road's reference line.
+    """An `occluder` at a world `pose`. The comer behind it comes out along the line across the road
+    at `s`, and is visible beyond `edge_m` from the road's reference line.
     """
 
     occluder: str
@@ -84,13 +84,13 @@ class Hiding:
 
 
 def is_reported(occluder: str) -> bool:
-    """Whether perception knows the class of a body of the catalogue."""
+    """Return True if perception knows the class of a catalogue body."""
     return CATALOGUE[occluder].label is not None
 
 
 def draw_hiding(rng: np.random.Generator, spot: Spot, side: Side, who: str) -> Hiding | None:
-    """Somewhere to hide for `who` comes from a side of a spot's road; None where the drawn body may
-    not stand.
+    """Draw a hiding place for `who`, on a side of a spot's road; None if the drawn body may not
+    stand there.
     """
     at_kerb = who in AT_KERB and rng.random() < EVEN_CHANCE
     beyond = AT_GARDEN if side.garden_m else AT_YARD
@@ -120,7 +120,9 @@ def draw_hiding(rng: np.random.Generator, spot: Spot, side: Side, who: str) -> H
 
 
 def _at_the_corner(spot: Spot, side: Side, occluder: str, gap: float) -> Hiding:
-    """Along the main road, where the plot at the corner begins, with its end at the side street."""
+    """Return the place along the main road of the plot at the corner, with its end at the side
+    street.
+    """
     length, width, _ = CATALOGUE[occluder].size
     begins = _plot_from(spot, side, length)
     place = np.array([begins + width / 2, side.sign * (side.boundary_m + length / 2), np.pi / 2])
@@ -129,8 +131,8 @@ def _at_the_corner(spot: Spot, side: Side, occluder: str, gap: float) -> Hiding:
 
 
 def _plot_from(spot: Spot, side: Side, depth: float) -> float:
-    """Where along a side street the plot beside it begins, over a `depth` from its pavement on:
-    behind the pavement of the main road, from which the side street may lead off askew.
+    """Return where along a side street the plot beside it begins, over a `depth` from its pavement.
+    It is behind the main road's pavement, which may be at an oblique angle.
     """
     assert spot.beside is not None
     edges = np.array([side.boundary_m, side.boundary_m + depth])
@@ -141,10 +143,12 @@ def _plot_from(spot: Spot, side: Side, depth: float) -> float:
 
 
 def _place(side: Side, width: float, at_kerb: bool) -> tuple[float, float]:
-    """How far from the reference line the middle of an occluder is, and its edge to the road."""
+    """Return the distances of an occluder's middle and of its edge to the road from the reference
+    line.
+    """
     if not at_kerb:
         return side.boundary_m + width / 2, side.boundary_m
-    # What is wider than the parking lane stands to the kerb.
+    # Bodies wider than the parking lane stand at the kerb.
     middle = min(abs(side.parking_d), side.kerb_m - width / 2)
     return middle, middle - width / 2
 
@@ -153,23 +157,24 @@ MOST_SIGHT_S = 2.7
 """A car that comes from the left at 4 m/s across the narrowest street is in sight for 2.6 s."""
 TRIES = 50
 IMPACT_AT: Range = (0.25, 0.75)
-"""Where along the ego's width, from the side from which they come, a conflict hits: the outer ones
-of Euro NCAP's impact points.
+"""Impact points of a conflict along the ego's width, from the comer's side: the outer ones of Euro
+NCAP.
 """
 ENCROACHMENT_S: Range = (0.3, 1.0)
-"""Post-encroachment time of a near miss (Allen, Shin and Cooper 1978): at least that of the
-dart-out, at most the second below which encroachments count as critical (Peesapati, Hunter and
-Rodgers 2018)."""
+"""Post-encroachment time of a near miss (Allen, Shin and Cooper 1978). At least that of the
+dart-out, at most 1 s, below which encroachments count as critical (Peesapati, Hunter and Rodgers
+2018).
+"""
 STOP_SHORT_M = 0.3
-"""Who stops leaves this much to the lane, and to an ego that reaches out of it in a turn."""
+"""Distance of a stopping comer from the lane, and from an ego that reaches out of it in a turn."""
 HALF_BICYCLE_M = 0.84
-"""The point that is hit lies half a length behind the front, of what is longer than a bicycle as
-far behind as of one.
+"""The impact point is half a length behind the front; for bodies longer than a bicycle, half a
+bicycle's length.
 """
 
 
 class Course(StrEnum):
-    """Course of an encounter if the ego drives on as it means to."""
+    """Course of an encounter if the ego drives on as planned."""
 
     CONFLICT = "conflict"
     NEAR_MISS = "near-miss"
@@ -177,11 +182,13 @@ class Course(StrEnum):
 
 
 COURSES = {Course.CONFLICT: 0.5, Course.NEAR_MISS: 0.25, Course.STOP: 0.25}
-"""Shares: braking for everybody must not pay, so half of all encounters need none."""
+"""Shares of the courses. Braking for everybody must not pay, so half of all encounters need no
+braking.
+"""
 
 
 class Way(StrEnum):
-    """How the ego's way runs while it sees who comes."""
+    """Shape of the ego's way while it sees the comer."""
 
     STRAIGHT = "straight"
     BEND = "bend"
@@ -190,7 +197,7 @@ class Way(StrEnum):
 
 @dataclass(frozen=True)
 class Comer:
-    """How somebody comes out: speed in m/s, and the metres in which it is reached, in the shade."""
+    """Motion of a comer: speed in m/s, and the metres in which it is reached, while hidden."""
 
     speed_mps: Range
     run_up_m: float
@@ -209,9 +216,9 @@ COMERS = {
 
 @dataclass(frozen=True)
 class Wanted:
-    """Which encounters are wanted: at most `most` in a drive, from 0 on; from the `side` +1 (left)
-    or -1 (right); of `who`, one of `COMERS`; behind what perception reports, or does not. None
-    stands for all.
+    """Filter of encounters: at most `most` per drive, from 0 on; from the `side` +1 (left) or -1
+    (right); of `who`, one of `COMERS`; behind reported or unreported occluders. None stands for
+    all.
     """
 
     most: int = 3
@@ -225,12 +232,12 @@ ANYBODY = Wanted()
 
 @dataclass(frozen=True)
 class Encounter:
-    """Somebody of the kind `who` waits behind an `occluder` at `occluder_pose`, beside `s` metres
-    along the road's line, and comes from the `side` +1 (left) or -1 (right).
+    """A comer of the kind `who` waits behind an `occluder` at `occluder_pose`, `s` metres along the
+    road's line, on the `side` +1 (left) or -1 (right).
 
-    `walk` is the way in the world, `from_d` where it begins in the road's d. The ego's middle is
-    `arrival_m` along its route when its front is at `walk`'s line; `lead_s` is the ego's time until
-    then at which `walk` begins.
+    `walk` is the way in the world, `from_d` its begin in the road's d. The ego's middle is
+    `arrival_m` along its route when its front is at `walk`'s line. `walk` begins when the ego needs
+    `lead_s` more until then.
     """
 
     who: str
@@ -249,22 +256,22 @@ class Encounter:
 
     @property
     def along_m(self) -> float:
-        """Where on the route the line is."""
+        """Place of the line on the route."""
         return self.arrival_m + EGO_LENGTH_M / 2 + CATALOGUE[self.who].size[1] / 2
 
     @property
     def occluder_reported(self) -> bool:
-        """Whether perception knows the occluder's class."""
+        """True if perception knows the occluder's class."""
         return is_reported(self.occluder)
 
 
 def draw_encounter(
     rng: np.random.Generator, spot: Spot, approach: Approach, wanted: Wanted = ANYBODY
 ) -> Encounter | None:
-    """A `wanted` encounter at a spot, redrawn until an ego on its `approach` sees who comes for as
-    long as is stated; None where it never would after `TRIES`.
+    """Draw a `wanted` encounter at a spot, again until an ego on its `approach` sees the comer for
+    the stated time; None after `TRIES`.
     """
-    # The side is drawn once: redrawn, it would be the near one more often.
+    # The side is drawn once: redrawing would favour the near one.
     side = spot.road.sides[int(rng.integers(2))]
     side = side if wanted.side is None else spot.road.side(wanted.side)
     for _ in range(TRIES):
@@ -273,13 +280,13 @@ def draw_encounter(
         hiding = draw_hiding(rng, spot, side, who)
         if hiding and wanted.reported not in (None, is_reported(hiding.occluder)):
             continue
-        drawn = hiding and _coming_out(rng, spot, side, who, hiding, approach)
+        drawn = hiding and _draw_course(rng, spot, side, who, hiding, approach)
         if drawn and drawn.sight.spare_s >= 0 and drawn.sight.seconds <= MOST_SIGHT_S:
             return drawn
     return None
 
 
-def _coming_out(
+def _draw_course(
     rng: np.random.Generator,
     spot: Spot,
     side: Side,
@@ -287,7 +294,7 @@ def _coming_out(
     hiding: Hiding,
     approach: Approach,
 ) -> Encounter | None:
-    """`who` comes out of hiding on some course; None without a way to stop on, or out of sight."""
+    """Draw the course of `who` out of hiding; None without a place to stop, or out of sight."""
     length, width, _ = CATALOGUE[who].size
     comer = COMERS[who]
     speed = draw(rng, comer.speed_mps)
@@ -298,7 +305,7 @@ def _coming_out(
     line = Line((x, y, heading), side.sign)
     arrival = approach.arrival(line, width / 2)
 
-    # All ways are of the middle, from its start behind the occluder's edge by the run-up.
+    # Ways are those of the comer's middle, which starts behind the occluder's edge by the run-up.
     start = hiding.edge_m + comer.run_up_m + length / 2
     hit = start - arrival.at_m - impact - length / 2 + min(length / 2, HALF_BICYCLE_M)
     clear = start - arrival.reach_m[0] + length / 2
@@ -329,8 +336,8 @@ def _coming_out(
 def _way_m(
     road: Road, side: Side, who: str, start: float, course: Course, arrival: Arrival
 ) -> float:
-    """How far somebody goes who waits `start` from the middle of the ego's lane: to the edge of the
-    lanes, to the far pavement, or with a car into the drive beyond it.
+    """Return the length of a comer's way that begins `start` from the middle of the ego's lane. It
+    ends at the edge of the lanes, at the far pavement, or, for a car, in the drive beyond.
     """
     length = CATALOGUE[who].size[0]
     if course is Course.STOP:

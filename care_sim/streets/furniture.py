@@ -10,23 +10,24 @@ from care_sim.streets.layouts import Joining, Plan, Range, Road, Side, draw
 from care_sim.world.bodies import CATALOGUE
 
 OCCUPANCY: Range = (0.1, 0.85)
-"""Share of a parking lane that is taken, drawn per side: from a nearly empty street up to the 85%
-at which Shoup (2005, The High Cost of Free Parking) calls one full."""
+"""Occupied share of a parking lane, drawn per side: from a nearly empty street up to the 85% that
+Shoup (2005, The High Cost of Free Parking) calls full.
+"""
 PARKING_GAP_M: Range = (0.6, 1.6)
-"""Between bumpers: with the mean car, the 5.7 m that RASt 06 gives a vehicle along the kerb."""
+"""Gap between bumpers: with the mean car, the 5.7 m that RASt 06 gives a vehicle along the kerb."""
 PARKED_KINDS = {"car": 0.86, "van": 0.09, "truck": 0.05}
 """Annotations of nuScenes with attribute parked: 330 thousand cars, 56 thousand trucks (which cover
 vans: two in three of those that park in a street)."""
 OFF_KERB_M: Range = (-0.15, 0.15)
 OFF_LINE: Range = (-0.03, 0.03)
-"""How far a parked vehicle stands off the middle of its lane, metres, and off its direction,
+"""Spread of a parked vehicle about the middle of its lane, metres, and about its direction,
 radians.
 """
 YARD_CHANCE = 0.2
 YARD_M: Range = (3.0, 7.0)
-"""Between two blocks of a closed front, now and then: an entrance to a yard."""
+"""Occasional gap in a closed front: an entrance to a yard."""
 HOUSE_GAP_M: Range = (6.0, 12.0)
-"""Between detached houses: twice the 3 m that German building codes keep from a boundary, and a
+"""Gap between detached houses: twice the 3 m that German building codes keep from a boundary, and a
 garage.
 """
 GATE_WIDTH_M: Range = (1.0, 3.5)
@@ -37,21 +38,21 @@ CORNER_M = 5.0
 BUS_STOP_CHANCE = 0.25
 """A stop every 400 m, as is usual in town, and some 100 m of street per scene."""
 CLOSE_M = 0.02
-"""Between things that touch."""
+"""Gap between touching bodies."""
 START_M: Range = (0.0, 3.0)
-"""Where a row begins, so that rows do not begin alike."""
+"""Begin of a row, so that rows do not begin alike."""
 RETRY_M = 0.5
-"""Steps in which a place is sought for what has no room."""
+"""Steps of the search for a place."""
 JOINING_M = 60.0
-"""Side streets are furnished this far: sight from the main road ends at 50 m."""
+"""Furnished length of side streets: sight from the main road ends at 50 m."""
 
 Span = tuple[float, float]
 
 
 def furnish(draft: Draft, plan: Plan, span: Span, joining_m: float = JOINING_M) -> None:
     """Fill the main road over `span` (metres along it), and its side streets over `joining_m`."""
-    # What must stay free comes first, then the bus, which is longer than most gaps between the
-    # rest.
+    # Reserved ground comes first, then the bus, which is longer than most gaps between other
+    # bodies.
     for joining in plan.joinings:
         _keep_mouth_clear(draft, joining, plan.main, joining_m)
     if draft.rng.random() < BUS_STOP_CHANCE:
@@ -85,7 +86,7 @@ def _keep_mouth_clear(draft: Draft, joining: Joining, main: Road, reach_m: float
 
 
 def _stop_bus(draft: Draft, road: Road, span: Span) -> None:
-    """A bus at its stop, to the kerb; it juts out of the parking lane."""
+    """Place a bus at its stop, at the kerb; it juts out of the parking lane."""
     d = CATALOGUE["bus"].size[1] / 2 - road.right.kerb_m
     draft.stand("bus", road.curve.to_world(np.array([draft.rng.uniform(*span), d, 0.0])))
 
@@ -105,12 +106,12 @@ class _Row:
     turned: Range = (0.0, 0.0)
 
     def fill(self, draft: Draft, road: Road, span: Span) -> None:
-        """Fill the row from end to end. What finds no room is tried further on."""
+        """Fill the row from end to end. Bodies without room are tried farther on."""
         s = span[0] + draw(draft.rng, START_M)
         kind = self.next_kind()
         while s < span[1]:
-            # Metres along the line: beside it a bend makes them shorter or longer, so the length
-            # that is kept free is the larger.
+            # Metres along the line: beside it a bend makes them shorter or longer, so the larger
+            # length is kept free.
             length = CATALOGUE[kind or "car"].size[0] * (
                 1 + abs(road.curve.curvature_at(s) * self.d)
             )
@@ -126,27 +127,27 @@ class _Row:
 
 
 def _line_with_houses(draft: Draft, road: Road, side: Side, span: Span) -> None:
-    """A closed front at the pavement, or detached houses behind gardens with hedges."""
+    """Place a closed front at the pavement, or detached houses behind gardens with hedges."""
     rng = draft.rng
     if not side.garden_m:
-        _outside(
-            side.front_m, side, "building", lambda: _now_and_then(rng, YARD_CHANCE, YARD_M)
-        ).fill(draft, road, span)
+        _outside(side.front_m, side, "building", lambda: _draw_gap(rng, YARD_CHANCE, YARD_M)).fill(
+            draft, road, span
+        )
         return
     _outside(side.front_m, side, "house", lambda: draw(rng, HOUSE_GAP_M)).fill(draft, road, span)
     _outside(
-        side.boundary_m, side, "hedge", lambda: _now_and_then(rng, GATE_CHANCE, GATE_WIDTH_M)
+        side.boundary_m, side, "hedge", lambda: _draw_gap(rng, GATE_CHANCE, GATE_WIDTH_M)
     ).fill(draft, road, span)
 
 
 def _outside(edge_m: float, side: Side, kind: str, next_gap: Callable[[], float]) -> _Row:
-    """A row of one kind that begins `edge_m` from the reference line."""
+    """Return a row of one kind that begins `edge_m` from the reference line."""
     return _Row(side.sign * (edge_m + CATALOGUE[kind].size[1] / 2), lambda: kind, next_gap)
 
 
 def _park(draft: Draft, road: Road, side: Side, span: Span) -> None:
-    """Fill a parking lane, of which a share is taken that is drawn per side. Vehicles face as the
-    nearest lane leads.
+    """Fill a parking lane; the occupied share is drawn per side. Vehicles face in the direction of
+    the nearest lane.
     """
     rng = draft.rng
     occupancy = draw(draft.rng, OCCUPANCY)
@@ -164,6 +165,6 @@ def _park(draft: Draft, road: Road, side: Side, span: Span) -> None:
     row.fill(draft, road, span)
 
 
-def _now_and_then(rng: np.random.Generator, chance: float, gap: Range) -> float:
+def _draw_gap(rng: np.random.Generator, chance: float, gap: Range) -> float:
     """A drawn gap with a `chance`, else the least there is."""
     return draw(rng, gap) if rng.random() < chance else CLOSE_M

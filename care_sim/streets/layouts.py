@@ -1,5 +1,5 @@
-"""Road layouts: which roads a scene has and how they are divided. They are drawn first, and
-everything else is placed on them.
+"""Road layouts: the roads of a scene and their cross-sections. They are drawn first, and everything
+else is placed on them.
 
 A road's reference line (d = 0) is the middle of the lane that leads along it; traffic keeps right.
 Widths follow the German RASt 06 (directives for urban streets).
@@ -19,11 +19,11 @@ Range = tuple[float, float]
 SPEED_LIMIT_MPS = 30 / 3.6
 """All scenarios take place in a 30 km/h zone, the residential default of many European cities."""
 LANE_WIDTH_M = 3.5
-"""Of a traffic lane (German RASt 06)."""
+"""Width of a traffic lane (German RASt 06)."""
 PARKING_WIDTH_M = 2.5
-"""Of a parking lane that lorries may use (RASt 06)."""
+"""Width of a parking lane that lorries may use (RASt 06)."""
 PAVEMENT_WIDTH_M = 2.5
-"""Between parking lane and houses (RASt 06)."""
+"""Width between parking lane and houses (RASt 06)."""
 
 
 def draw(rng: np.random.Generator, values: Range) -> float:
@@ -87,14 +87,14 @@ GARDEN_M: Range = (3.0, 6.0)
 BEND_RADIUS_M: Range = (30.0, 60.0)
 """At 30 km/h a sideways acceleration of 2.3 to 1.2 m/s^2: what drivers take in an urban bend."""
 BEND_TURN: Range = (np.deg2rad(30.0), np.deg2rad(90.0))
-"""From a bend that one sees around to a corner that one does not."""
+"""From a bend with free sight to a corner without."""
 BEND_AT_M: Range = (15.0, 60.0)
 JUNCTION_AT_M: Range = (25.0, 80.0)
-"""Ahead of the ego's start, so that it comes by within the scene."""
+"""Distance ahead of the ego's start, so that the ego passes it within the scene."""
 JUNCTION_ANGLE: Range = (np.deg2rad(75.0), np.deg2rad(105.0))
-"""RASt 06 asks for junctions that are nearly square."""
+"""Angle of a junction: RASt 06 wants nearly square ones."""
 EVEN_CHANCE = 0.5
-"""Where nothing speaks for either of two forms."""
+"""Chance of either of two equal forms."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ class Side:
 
     @property
     def boundary_m(self) -> float:
-        """From the reference line to where the private ground begins."""
+        """From the reference line to the private ground."""
         return self.kerb_m + self.pavement_m
 
     @property

@@ -14,8 +14,8 @@ from care_sim.streets.layouts import EVEN_CHANCE, Curve, Range, Road, Side, draw
 
 WALKING_MPS = 1.34
 WALKING_SPREAD_MPS = 0.26
-"""Speeds of people on foot: normal (Weidmann 1993, Transporttechnik der Fussgaenger), cut at two
-spreads.
+"""Speeds of people on foot: normally distributed (Weidmann 1993, Transporttechnik der Fussgaenger),
+cut at two spreads.
 """
 CYCLING_MPS = 4.25
 CYCLING_SPREAD_MPS = 0.9
@@ -23,29 +23,30 @@ CYCLING_SPREAD_MPS = 0.9
 et al. 2017); the spread is a fifth of it, as that of people on foot. Cut at two spreads."""
 PEOPLE_PER_100M: Range = (1.0, 8.0)
 """People on 100 m of one pavement, drawn per scene. nuScenes annotates 6.4 people per keyframe (218
-thousand in 34 thousand). Two pavements within 50 m are 200 m, and half of the people there are
-hidden, behind parked vehicles and each other: 6.4 on 100 m would make as many, and not all that
-nuScenes annotates are that near."""
+thousand in 34 thousand), not all within 50 m. Two pavements within 50 m are 200 m, and parked
+vehicles or other people hide half of the people there. So 6.4 on 100 m would give that number.
+"""
 STANDING_SHARE = 0.28
 """Annotations of people in nuScenes with attribute standing or sitting: 60 of 218 thousand."""
 CROSSERS = 2.5
 EMERGING = 2.5
-"""Mean number of people per scene who cross the main road, and who step out of a yard or a garden:
-chosen so that most scenes have a few of either. Both are Poisson."""
+"""Mean numbers of people per scene who cross the main road, and who step out of a yard or a garden.
+Most scenes then have a few of both. Both are Poisson.
+"""
 CYCLISTS_PER_H: Range = (20.0, 100.0)
 """Per hour on a cycle lane: from the 11% of all trips (Mobilitaet in Deutschland 2017) beside weak
 traffic to twice that beside strong traffic."""
 BICYCLES_PER_100M = 0.2
-"""Bicycles that stand on 100 m of pavement. nuScenes annotates 0.26 per keyframe without a rider
-(8,946 in 34 thousand) on 200 m of pavement, and a third of them are hidden."""
+"""Standing bicycles on 100 m of pavement. In nuScenes 0.26 per keyframe have no rider (8,946 in 34
+thousand), on 200 m of pavement. A third of them are hidden.
+"""
 PERSON_BERTH_M = 0.1
 PAVEMENT_MARGIN_M = 0.5
 """People keep off walls and kerbs by half a metre (the shy distance of the Highway Capacity
 Manual).
 """
 TRIES = 40
-"""Ways that are drawn for one person until one is free. Without a free one the person is left out.
-"""
+"""Most ways drawn for a person until one is free. Without a free one the person is left out."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ class Walked:
         # Metres done at every point of the way, and by the walker at every time.
         covered = np.concatenate([[0.0], np.cumsum(np.hypot(*legs.T))])
         way = np.clip(self.speed * (times - self.starts_s), 0.0, covered[-1])
-        # Who stands at the end still faces along the last leg.
+        # A walker at the end still faces along the last leg.
         leg = np.clip(np.searchsorted(covered, way, side="right") - 1, 0, len(legs) - 1)
         x, y = (np.interp(way, covered, points[:, axis]) for axis in (0, 1))
         return np.column_stack([x, y, np.arctan2(legs[leg, 1], legs[leg, 0])])
@@ -103,7 +104,7 @@ def _populate_side(
 ) -> None:
     hundreds = (span[1] - span[0]) / 100.0
     people = draft.rng.poisson(people_per_100m * hundreds)
-    # Those who stand come first: they need a place, and who walks can go round them.
+    # Standing people come first: they need a place, and walkers can go round them.
     standing = draft.rng.binomial(people, STANDING_SHARE)
     for _ in range(standing):
         _stand(draft, "pedestrian", lambda: _waiting(draft, road, side, span))
@@ -124,7 +125,7 @@ def cross_and_emerge(draft: Draft, road: Road, span: Span) -> None:
 
 
 def _walk_about(draft: Draft, draw_way: Callable[[], Floats]) -> None:
-    # The first way that is free ends the tries.
+    # The first free way ends the tries.
     any(draft.move("pedestrian", draw_way(), PERSON_BERTH_M) for _ in range(TRIES))
 
 
@@ -137,16 +138,17 @@ def _speed(rng: np.random.Generator, mean: float, spread: float) -> float:
 
 
 def _walk(draft: Draft, road: Road, *corners: tuple[float, float], passes: float) -> Floats:
-    """The path of a person past `corners`; at a random time `passes` metres of it are done."""
+    """Return the path of a person past `corners`; `passes` metres of it are done at a random
+    time.
+    """
     speed = _speed(draft.rng, WALKING_MPS, WALKING_SPREAD_MPS)
-    # Back from the moment at which `passes` metres are done to that of the first one, which may lie
-    # before the scene.
+    # Back from that moment to the start, which may lie before the scene.
     starts = draft.rng.uniform(0.0, float(draft.times[-1])) - passes / speed
     return Walked(road.curve, corners, speed, float(starts)).poses(draft.times)
 
 
 def _waiting(draft: Draft, road: Road, side: Side, span: Span) -> Floats:
-    """A place (3,) on a pavement, facing anywhere."""
+    """Draw a place (3,) on a pavement, facing anywhere."""
     place = draft.rng.uniform(*span), _pavement_d(draft, side), draft.rng.uniform(-np.pi, np.pi)
     return road.curve.to_world(np.array(place))
 
@@ -189,13 +191,14 @@ def _leaning(draft: Draft, road: Road, side: Side, span: Span) -> Floats:
 
 
 def _cycle(draft: Draft, road: Road, side: Side, span: Span) -> None:
-    """Cyclists on one cycle lane. They keep right: along the line on its right side, against it on
-    its left.
+    """Add cyclists on one cycle lane. They keep right: along the line on its right side, against it
+    on its left.
     """
     per_m = draw(draft.rng, CYCLISTS_PER_H) / 3600.0 / CYCLING_MPS
     along = -side.sign
     reach = along * 2 * CYCLING_MPS * float(draft.times[-1])
-    # Also those who come into the span during the scene: they start as far before it as they get.
+    # Also cyclists who enter the span during the scene: they start before it by the way that they
+    # ride.
     for _ in range(draft.rng.poisson(per_m * (span[1] - span[0] + abs(reach)))):
         s = draft.rng.uniform(min(span[0], span[0] - reach), max(span[1], span[1] - reach))
         speed = _speed(draft.rng, CYCLING_MPS, CYCLING_SPREAD_MPS)
@@ -210,5 +213,5 @@ def _pavement_d(draft: Draft, side: Side) -> float:
 
 
 def _far(draft: Draft) -> float:
-    """Further than anybody walks in a scene."""
+    """Return a distance that nobody walks in a scene."""
     return (WALKING_MPS + 2 * WALKING_SPREAD_MPS) * float(draft.times[-1] + 1.0)

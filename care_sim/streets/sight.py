@@ -1,6 +1,6 @@
-"""How an ego that drives on as planned comes by somebody's line across the road: when its front is
-there, where on the line it passes, and from when on it sees who comes out, reckoned by lines of
-sight seen from above.
+"""Arrival and sight of an ego that drives on as planned at a comer's line across the road. Computes
+when its front is there, where on the line it passes, and from when on it sees the comer, by lines
+of sight from above.
 """
 
 from dataclasses import dataclass
@@ -20,9 +20,9 @@ from care_sim.world.route import SpeedPlan
 
 EGO_LENGTH_M, EGO_WIDTH_M, _ = CATALOGUE["ego"].size
 BEFORE_M = 50.0
-"""Looked at before a line: the range of the first-sighting protocol."""
+"""Distance before a line that is examined: the range of the first-sighting protocol."""
 PAST_M = 12.0
-"""Looked at behind it, until all of the ego is past a car that comes out."""
+"""Distance behind the line that is examined, until the whole ego is past a car that comes out."""
 SPACING_M = 0.25
 _OUTLINE: Floats = np.array(
     [
@@ -38,15 +38,15 @@ outermost, and the side's middle innermost.
 
 @dataclass(frozen=True)
 class Line:
-    """Somebody's way across a road, who comes from the `side` +1 (left) or -1 (right). `foot` is
-    where it meets the road's reference line, headed as that.
+    """A comer's way across a road, from the `side` +1 (left) or -1 (right). `foot` is its
+    intersection with the road's reference line, with the line's heading.
     """
 
     foot: Pose
     side: int
 
     def local(self, points: Floats) -> Floats:
-        """World points (..., 2) as metres ahead of the line, as the road leads, and towards the
+        """Return world points (..., 2) as metres ahead of the line, along the road, and towards the
         side.
         """
         return turned(points - self.foot[:2], -self.foot[2]) * (1, self.side)
@@ -59,9 +59,9 @@ class Line:
 
 @dataclass(frozen=True)
 class Arrival:
-    """The ego's front has come to who goes along a line. `place_m` is the ego's middle along its
-    route, `time_s` the approach's time, `at_m` where on the line the middle of its front is, metres
-    towards the side, `reach_m` from where to where it takes up the line until it is past.
+    """The ego's front at a comer's line. `place_m` is the ego's middle along its route, `time_s`
+    the approach's time. `at_m` is the middle of its front on the line, metres towards the side.
+    `reach_m` are the ends of the part of the line that the ego covers until it is past.
     """
 
     place_m: float
@@ -72,8 +72,8 @@ class Arrival:
 
 @dataclass(frozen=True)
 class Approach:
-    """An ego that drives on as planned: `places` (n,) of its middle along its route, ascending,
-    `times` (n,) from the first on, `speeds` (n,) in m/s and world `poses` (n, 3).
+    """An ego that drives on as planned. `places` (n,) of its middle along its route ascend, `times`
+    (n,) count from the first. `speeds` (n,) are m/s, `poses` (n, 3) in the world.
     """
 
     places: Floats
@@ -83,16 +83,18 @@ class Approach:
 
     @classmethod
     def along(cls, plan: SpeedPlan, from_m: float, to_m: float) -> "Approach":
-        """The ego's way to lines that lie `from_m` to `to_m` along its route, and past them."""
+        """Return the ego's way to lines `from_m` to `to_m` along its route, and past them."""
         places = np.arange(max(from_m - BEFORE_M, 0.0), to_m + PAST_M, SPACING_M)
         speeds = np.array([plan.at(place) for place in places.tolist()])
         poses = np.array([plan.route.pose(place) for place in places.tolist()])
         return cls(places, plan.times(places), speeds, poses)
 
     def arrival(self, line: Line, half_width: float) -> Arrival:
-        """When the front comes to a line on which who goes takes `half_width` to either side."""
+        """Return the arrival of the front at a line whose comer covers `half_width` to either
+        side.
+        """
         ahead, aside = line.local(_points((EGO_LENGTH_M / 2, 0.0), self.poses)).T
-        # Before a turn the ego may be ahead of the line already: the last time it comes to it.
+        # Before a turn the ego may already be ahead of the line: take its last arrival.
         last = int(np.flatnonzero(ahead < -half_width)[-1])
         share = (-half_width - ahead[last]) / (ahead[last + 1] - ahead[last])
         place, time, at = (
@@ -117,15 +119,14 @@ def _points(on_ego: ArrayLike, poses: Floats) -> Floats:
 
 
 SHOWN_M = 0.3
-"""Of who comes out, what must stick out for three returns at 15 m, where columns are 0.18 m apart.
-"""
+"""Visible width of a comer for three returns at 15 m, where columns are 0.18 m apart."""
 HIDDEN_S = MemoryRules().coast_s
-"""Nobody counts as hidden who was in sight within this time: the tracker holds a track as long."""
+"""A comer in sight within this time is not hidden: the tracker keeps a track as long."""
 TRACKED_S = 0.2
-"""Two keyframes, the second of which tells a velocity."""
+"""Two keyframes, the second of which gives a velocity."""
 CONTROLLER = DriverSettings()
 EVERY_S = 0.2
-"""Between two lines of sight that are kept: the ego moves by less than half of its length."""
+"""Time between stored lines of sight, in which the ego moves by less than half of its length."""
 
 Point = tuple[float, float]
 """World x and y."""
@@ -133,11 +134,11 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Sight:
-    """Time in sight: whoever comes is in sight for `seconds` before an ego that drives on is where
-    it would hit them.
+    """Time in sight: the comer is in sight for `seconds` before an ego that drives on would hit the
+    comer.
 
-    `spare_s` of these are more than an ego needs that brakes at once. `lines` of sight go from the
-    LiDAR to who comes. `yaws` says whether the ego's heading changes meanwhile.
+    `spare_s` of these exceed the need of an ego that brakes at once. `lines` of sight go from the
+    LiDAR to the comer. `yaws` is True if the ego's heading changes meanwhile.
     """
 
     seconds: float
@@ -147,8 +148,8 @@ class Sight:
 
 
 def needed_s(speed: float) -> float:
-    """Seconds that an ego at `speed` m/s needs to be seen in sight: until there is a track and the
-    brake acts, and half of the time to stand, in which it drives what it would drive on.
+    """Return the seconds in sight that an ego at `speed` m/s needs: until there is a track and the
+    brake acts, plus half of the time to stop.
     """
     return TRACKED_S + CONTROLLER.brake_reaction_s + speed / (2 * CONTROLLER.brake_mps2)
 
@@ -163,10 +164,10 @@ def sight_of(
     lead_s: float,
     hit_s: float,
 ) -> Sight | None:
-    """How the ego sees who goes on a `walk`, `length` metres long, from behind an `occluder` at a
-    `pose`; None where it does before, or without being hidden for HIDDEN_S.
+    """Return the ego's sight of a comer on a `walk`, `length` metres long, from behind an
+    `occluder` at a `pose`. None if the comer is visible before, or not hidden for HIDDEN_S.
 
-    The walk begins `lead_s` before the arrival, and `hit_s` later it is where it would be hit.
+    The walk begins `lead_s` before the arrival; `hit_s` later the comer is at the impact point.
     """
     since = approach.times - arrival.time_s + lead_s
     forward = np.array([np.cos(walk.heading), np.sin(walk.heading)])
@@ -202,8 +203,8 @@ def _point(place: Floats) -> Point:
 
 
 def hides(body: Pose, size: tuple[float, float], eyes: Floats, points: Floats) -> Mask:
-    """(n,) whether a rectangle at a pose, `size` long and wide, cuts the lines of sight from `eyes`
-    (n, 2) to `points` (n, 2), seen from above.
+    """Return (n,) whether a rectangle at a pose, `size` long and wide, cuts the lines of sight from
+    `eyes` (n, 2) to `points` (n, 2), seen from above.
     """
     # Slab test in the body's frame: a line is within the rectangle where it is within both its
     # length and its width.

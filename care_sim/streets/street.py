@@ -1,12 +1,12 @@
 """A street: everything that stands and moves in a scene over its keyframes. Pure data, drawn from a
 seed.
 
-Every number stands with its reason where it is used, and all were fixed before any policy ran.
-Counts of nuScenes are those of its annotations in trainval (34,149 keyframes), by class and
-attribute. On seeds 2000 to 2023, which belong to neither list below, a scene has 26 first sightings
-within 50 m, where nuScenes has 28 (31 with `presence="visible"` of
-`care_sim.evaluation.sightings`), and 22 annotated objects per keyframe within 50 m, where nuScenes
-has 24 of the five classes at all ranges.
+Every number has its reason where it is used, and all were fixed before any policy ran. Counts of
+nuScenes are those of its annotations in trainval (34,149 keyframes), by class and attribute.
+
+Seeds 2000 to 2023 belong to neither list below. A scene of them has 26 first sightings within 50 m,
+where nuScenes has 28 (31 with `presence="visible"` of `care_sim.evaluation.sightings`). It has 22
+annotated objects per keyframe within 50 m, where nuScenes has 24 of the five classes at all ranges.
 """
 
 import hashlib
@@ -16,7 +16,7 @@ import numpy as np
 
 from care_sim.core.arrays import Floats
 from care_sim.core.types import Ego
-from care_sim.streets.clutter import Placed, strew
+from care_sim.streets.clutter import Placed, place_clutter
 from care_sim.streets.draft import STEP_S, STREET_KEYFRAME_S, Draft
 from care_sim.streets.drivers import BEYOND_M, drive_joining, drive_main
 from care_sim.streets.furniture import JOINING_M, furnish
@@ -28,15 +28,16 @@ EVALUATION_SEEDS = tuple(range(150))
 among them.
 """
 CALIBRATION_SEEDS = tuple(range(1000, 1020))
-"""20 other scenes, for whatever is to be set before the evaluation. They are far away, so that
-neither list grows into the other."""
+"""20 other scenes, for choices before the evaluation. They are far away, so that neither list grows
+into the other.
+"""
 
 
 @dataclass(frozen=True)
 class Street:
     """Bodies by `kinds` (n,) of the catalogue, with world `poses` (k, n, 3) at every keyframe; the
-    ego's `ego` poses (k, 3) and `motion` (k,). `clutter` is what stands beside and has no class:
-    bodies with their poses.
+    ego's `ego` poses (k, 3) and `motion` (k,). `clutter` holds bodies without a class, with their
+    poses.
     """
 
     name: str
@@ -47,8 +48,8 @@ class Street:
     clutter: tuple[Placed, ...] = ()
 
     def digest(self) -> str:
-        """SHA-256 over the kinds and over all poses in whole millimetres and milliradians, ego
-        first, then the clutter: the same on every machine whose arithmetic agrees that far.
+        """Return SHA-256 over the kinds and over all poses in whole millimetres and milliradians,
+        ego first, then the clutter. It is equal on every machine whose arithmetic agrees that far.
         """
         content = hashlib.sha256(",".join(self.kinds).encode())
         for poses in (self.ego, self.poses):
@@ -70,13 +71,12 @@ def street_name(seed: int) -> str:
 
 
 def make_street(seed: int, clutter: bool = False) -> Street:
-    """The street of a seed. Layouts come in turn, everything else is drawn. Nothing outside the
-    seed enters. With `clutter` (`care_sim.streets.clutter`) the same street has more in it.
+    """Make the street of a seed. Layouts come in turn, everything else is drawn, only from the
+    seed. With `clutter` (`care_sim.streets.clutter`) the same street has more in it.
     """
     layout = _layout(seed)
-    # Each part has a stream of its own, so that a change in one does not draw the others anew. What
-    # drives comes before what stands and who walks: they find room round the traffic, not it round
-    # them.
+    # Each part has its own stream, so that a change of one leaves the others' draws. Traffic comes
+    # first: standing bodies and walkers find room around it.
     plans, traffic, furniture, people, strewing = (
         np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(5)
     )
@@ -100,8 +100,8 @@ def make_street(seed: int, clutter: bool = False) -> Street:
     for road, reach in roads:
         populate(draft, road, reach)
     draft.rng = strewing
-    strewn = strew(draft, roads) if clutter else ()
-    # Ways are sampled more often than keyframes come, for the tests of room.
+    strewn = place_clutter(draft, roads) if clutter else ()
+    # Ways are sampled more often than keyframes, for the tests of room.
     every = round(STREET_KEYFRAME_S / STEP_S)
     poses = np.stack(draft.ways, axis=1)[::every]
     return Street(

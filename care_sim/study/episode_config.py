@@ -48,7 +48,7 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
     budget: float = 0.1
     seed: int = 0
     keyframe_s: float = KEYFRAME_S
-    # Made, since a field with a name for its default takes nothing but names.
+    # Made by a factory, since a field with a name as default takes only names.
     sensor: str | SensorSetup = field(default_factory=lambda: DEFAULT_SETUP)
     detector: str = PROXY
     detector_parameters: Parameters = ()
@@ -65,7 +65,7 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
         check_seed(self.seed)
         self.check_task(sensor_setup(self.sensor).grid)
         make_scenario(self.scenario, **dict(self.scenario_parameters))
-        # Workers would not find a scenario that this process alone knows, and nothing would tell
+        # Workers would not find a scenario that only this process has, and no digest would cover
         # its code.
         if self.scenario in SCENARIOS and self.scenario not in ENVIRONMENT_IDS:
             raise InvalidInput(
@@ -96,9 +96,9 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
         return sensor_columns(self.sensor)
 
     def installed(self) -> list[str | None]:
-        """Return the hashes of installed code: those of the base; of another detector than the
-        default, and of a scenario that is not built in, its hash and those of the files that its
-        parameters name; and of the files that the detector says it reads.
+        """Return the hashes of installed code: the base's, and those of a non-default detector and
+        a foreign scenario. Includes the files in their parameters, and the files that the detector
+        declares.
         """
         own = super().installed()
         if self.detector != PROXY:
@@ -115,13 +115,15 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
 
     @property
     def order(self) -> int:
-        """The seed: an interrupted study leaves whole pairs of policies, up to a batch of each."""
+        """Ordered by seed: an interrupted study leaves whole pairs of policies, up to a batch of
+        each.
+        """
         return self.seed
 
     @property
     def batch(self) -> Hashable:
         """Everything but the seed. An episode is played alone (`care_sim.study.episode_play`) if
-        its policy asks for the truth, or if its scenario or detector is not built in.
+        its policy reads truth, or if its scenario or detector is not built in.
         """
         is_known = self.scenario in SCENARIOS and self.detector in PRIVILEGED
         together = is_known and "privileged" not in tags_of(self.policy)
@@ -129,7 +131,7 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
 
 
 def closed_loop(env: gymnasium.Env[Any, Any]) -> ClosedLoopEnv:
-    """The environment of an episode without what Gymnasium puts around it."""
+    """Return the environment of an episode without Gymnasium's wrappers."""
     return cast(ClosedLoopEnv, env.unwrapped)
 
 
@@ -142,7 +144,8 @@ def grid(
     camera_latencies: Sequence[int] = (0,),
     **common: Any,
 ) -> list[EpisodeConfig]:
-    """All combinations, without repeats; `full` runs once for all that it does not feel.
+    """Return all combinations, without repeats; `full` runs once for all conditions that do not
+    affect it.
 
     `common` are further fields of `EpisodeConfig`.
     """

@@ -38,15 +38,15 @@ from care_sim.world.world import World
 
 
 def world_hash(env: ClosedLoopEnv, seed: int) -> str:
-    """Return a hash of what stands in the world of a seed, and how it moves while the ego keeps its
-    speed, and while it brakes; measured numbers rounded (`care_sim.base.digests`). The world
-    is built anew.
+    """Return a hash of the bodies in a seed's world and their motions, once while the ego keeps its
+    speed and once while it brakes. Measured numbers are rounded (`care_sim.base.digests`). The
+    world is built anew.
     """
     content = hashlib.sha256()
-    # Somebody may react to a brake alone.
+    # An actor may react only to a brake.
     for acceleration in (0.0, -DriverSettings().brake_mps2):
         with closing(env.setting.episode(seed).world) as world:
-            content.update(portable_bytes(*_told(world)))
+            content.update(portable_bytes(*_world_content(world)))
             bodies = np.array([world.ego_body, *(actor.body for actor in world.actors)])
             while world.time < env.scenario.duration_s - LAST_BITS_S and not world.is_over():
                 content.update(portable_bytes(world.boxes_of(bodies)[:, [0, 1, 6]]))
@@ -54,9 +54,9 @@ def world_hash(env: ClosedLoopEnv, seed: int) -> str:
     return content.hexdigest()[:16]
 
 
-def _told(world: World) -> Iterator[tuple[Content, ...]]:
-    """Yield the content of a world before anything moves: the bodies with their parts, whom it is
-    about, and what its scenario has drawn.
+def _world_content(world: World) -> Iterator[tuple[Content, ...]]:
+    """Yield the content of a world before anything moves: bodies with their parts, the
+    first-sighting actor, and the drawn parameters.
     """
     for actor in world.actors:
         kind = actor.kind
@@ -73,8 +73,8 @@ _KIB_MB = 1024 / 1e6
 
 
 def result_or_reason(play: Callable[..., _Result], *arguments: object) -> _Result | str:
-    """Return what `play` returns, or in one line why it returns nothing. No exception leaves the
-    worker, which alone may know its class.
+    """Return the result of `play`, or the reason of its failure in one line. No exception leaves
+    the worker, since only the worker may have its class.
     """
     try:
         return play(*arguments)
@@ -88,11 +88,14 @@ def result_or_reason(play: Callable[..., _Result], *arguments: object) -> _Resul
 def run_episode(config: EpisodeConfig) -> Row:
     """Play an episode and return its row.
 
-    Every parameter of `EpisodeConfig.row`; `version` and `digest` of the configuration; as
-    `drawn.NAME` the parameters of the scenario that the seed drew; the fields of
-    `care_sim.loops.records.Outcome`; `keyframes`; `wall_s`; `peak_rss_mb` of the process so far;
-    `episode_hash` over cells fired, ranges returned and poses (`care_sim.base.digests`); and
-    of a scenario that is not built in `world_hash` (`care_sim.study.episode_play`).
+    Columns:
+
+    - every parameter of `EpisodeConfig.row`, `version` and `digest` of the configuration
+    - the scenario's drawn parameters as `drawn.NAME`
+    - the fields of `care_sim.loops.records.Outcome`
+    - `keyframes`, `wall_s`, and `peak_rss_mb` of the process so far
+    - `episode_hash` over fired cells, ranges and poses (`care_sim.base.digests`)
+    - `world_hash`, for a scenario that is not built in
     """
     return trace(config)[0]
 
@@ -103,8 +106,8 @@ def trace(
     begin: Callable[[OneWorld], None] = lambda _loop: None,
     wrap: Callable[[GymEnv, Policy], GymEnv] = lambda env, _policy: env,
 ) -> tuple[Row, list[Keyframe]]:
-    """Play an episode; gives its row and the record of every keyframe (for scoring only: it holds
-    truth).
+    """Play an episode and return its row and the record of every keyframe (for scoring only: it
+    holds truth).
 
     `begin` is called before the first keyframe, `watchers` after each; `wrap` puts wrappers that
     watch around the environment.
@@ -114,7 +117,7 @@ def trace(
     told = config.row()
     digest = EpisodeHash()
     inner = config.make_env()
-    # Made for the environment within the wrappers: the policy takes nothing from them.
+    # Made for the environment inside the wrappers: the policy takes nothing from them.
     policy = config.make_policy(inner)
     with wrap(inner, policy) as env:
         # The environment itself, which the wrappers that watch leave as it is.
@@ -141,8 +144,8 @@ def trace(
 
 
 class Played(NamedTuple):
-    """Remains of an episode: its parameters as they were when it began, and the rest of what
-    `run_episode` names.
+    """Data of a played episode: its parameters at the beginning, and the other columns of
+    `run_episode`.
     """
 
     told: Row
@@ -168,7 +171,7 @@ class Played(NamedTuple):
 
 
 class EpisodeHash:
-    """A hash over all that happens in an episode."""
+    """A hash over all events of an episode."""
 
     def __init__(self) -> None:
         self._content = hashlib.sha256()
@@ -199,26 +202,26 @@ def peak_rss_mb() -> float:
 
 
 MOST_TOGETHER = 16
-"""Episodes that are played together: more save no time worth telling, and an interrupted study
-would leave fewer whole pairs of policies.
+"""Episodes played together. More save hardly any time, and an interrupted study would leave fewer
+whole pairs of policies.
 """
 
 
 def play_episodes(batch: Sequence[EpisodeConfig]) -> list[Row | str]:
-    """Play episodes in a worker, and return for each its row, or in one line why there is none.
-    Those of an `EpisodeConfig.batch` are played together.
+    """Play episodes in a worker, and return for each its row, or the reason of its failure in one
+    line. Episodes of an `EpisodeConfig.batch` are played together.
     """
     if len(batch) > 1 and len({config.batch for config in batch}) == 1:
         rows = result_or_reason(play_together, batch)
         if not isinstance(rows, str):
             return [*rows]
-    # What is raised among many is not told: whose it is shows where each is played alone.
+    # An error of many episodes is not reported: playing each alone shows whose error it is.
     return [result_or_reason(run_episode, config) for config in batch]
 
 
 def play_together(configs: Sequence[EpisodeConfig]) -> list[Row]:
-    """The rows of episodes of one `EpisodeConfig.batch`, of whose time each has an even share.
-    Raises what any of them raises, and InvalidInput where they would not be what each is alone.
+    """Return the rows of episodes of one `EpisodeConfig.batch`, each with an even share of the
+    time. Raises any episode's error, and InvalidInput if results would differ from playing alone.
     """
     started = time.perf_counter()
     # The file of a set-up may be written anew while the episodes run.
@@ -244,7 +247,7 @@ def play_together(configs: Sequence[EpisodeConfig]) -> list[Row]:
             live = np.ones(count, np.bool_)
             # Worlds that are over rest until the last one is.
             while live.any():
-                # In copies, since a policy may keep what it is shown, and write into it.
+                # In copies, since a policy may keep observations, and write into them.
                 shown = {name: tables.copy() for name, tables in observed.items()}
                 actions = checked_scores(policy(shown, live), observed["ranges"].shape)
                 stepped = worlds.step(actions, live)
@@ -255,8 +258,8 @@ def play_together(configs: Sequence[EpisodeConfig]) -> list[Row]:
                 outcomes |= {w: stepped.single[w]["outcome"] for w in np.flatnonzero(over).tolist()}
                 keyframes += live
                 live &= ~over
-    # Who seeds a generator of the whole process in `reset`, and draws from it at keyframes, gets
-    # other numbers where others draw from it, too.
+    # A policy that seeds a process-wide generator in `reset`, and draws from it at keyframes, gets
+    # other numbers if others also draw from it.
     if _common_draws() != drawn:
         raise InvalidInput(f"policy {configs[0].policy} draws from a generator of the process")
     wall_s = (time.perf_counter() - started) / count
@@ -274,17 +277,17 @@ def play_together(configs: Sequence[EpisodeConfig]) -> list[Row]:
 
 
 def _common_draws() -> list[Any]:
-    """Where the generators are that everything in a process shares."""
+    """Return the states of the generators that a process shares."""
     _, words, *rest = cast(tuple[Any, ...], np.random.get_state())  # noqa: NPY002 (whose it may be)
     states: list[Any] = [random.getstate(), words.tobytes(), *rest]
-    # Whoever draws from it has imported it; nobody else waits for it.
+    # Code that draws from PyTorch has imported it; others need not wait for the import.
     if torch := sys.modules.get("torch"):
         states.append(torch.get_rng_state().numpy().tobytes())
     return states
 
 
 def _fired(stepped: Stepped, world: int) -> NDArray[np.int64] | list[int]:
-    """The cells that a world fired: a list of its own where numbers differ."""
+    """Return the cells that a world fired, as a list if numbers differ between worlds."""
     column: NDArray[np.int64] | None = stepped.columns.get("fired")
     cells: NDArray[np.int64] | list[int] = (
         column[world] if column is not None else stepped.single[world]["fired"]

@@ -1,6 +1,6 @@
-"""Where tasks are played: in processes of this machine, or on the workers of a dask cluster.
+"""Executors of tasks: processes of this machine, or the workers of a dask cluster.
 
-What becomes of the tasks of a worker that dies is decided in `care_sim.study.runner`.
+`care_sim.study.runner` handles the tasks of a dead worker.
 """
 
 import asyncio
@@ -28,12 +28,12 @@ if TYPE_CHECKING:
     from dask.distributed import Client
 
 _ANSWER_TIMEOUT_S = 10.0
-"""How long a scheduler may take to answer."""
+"""Time limit for a scheduler's answer."""
 P = ParamSpec("P")
 T = TypeVar("T")
 
 ExecutorFactory = Callable[[int], Executor]
-"""Makes an executor of so many workers; any executor of `concurrent.futures` will do."""
+"""Makes an executor with this many workers; any executor of `concurrent.futures` will do."""
 
 
 class ClusterLost(OSError):
@@ -41,8 +41,9 @@ class ClusterLost(OSError):
 
 
 def processes(workers: int) -> Executor:
-    """Worker processes on this machine, forked from a clean server that has imported the simulator.
-    They and the server end with this process. Raises LimitReached where too few can be started.
+    """Return worker processes on this machine, forked from a clean server that has imported the
+    simulator. They and the server end with this process. Raises LimitReached if too few can be
+    started.
     """
     check_workers(workers)
     # A fork of this process would carry its threads' locks along, and a spawned one would import
@@ -62,8 +63,8 @@ def processes(workers: int) -> Executor:
 
 
 def cluster(address: str) -> ExecutorFactory:
-    """The workers behind a dask scheduler, which need this package too; the scheduler says how many
-    there are.
+    """Return the workers behind a dask scheduler, which also need this package. The scheduler
+    decides their number.
 
     Raises MissingExtra without dask, InvalidInput when nobody answers at `address`.
     """
@@ -72,9 +73,7 @@ def cluster(address: str) -> ExecutorFactory:
 
 
 def parallel_batches(executor: Executor, workers: int) -> int:
-    """How many batches are played at the same time: `workers`, or as many as a cluster has threads
-    now.
-    """
+    """Return the number of parallel batches: `workers`, or the current threads of a cluster."""
     return executor.threads() if isinstance(executor, ClusterExecutor) else workers
 
 
@@ -92,18 +91,18 @@ class Processes(ProcessPoolExecutor):
             super().__init__(workers, context, _begin, (are_isolated(),))
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Hand a call over."""
+        """Submit a call."""
         with starting():
             return super().submit(fn, *args, **kwargs)
 
     def end_at_once(self) -> None:
-        """End the processes in the middle of what they play, for work of which no part is kept."""
+        """End the processes at once, for work of which no part is kept."""
         for process in list(self._processes.values()):
             process.kill()
 
 
 def _begin(isolates: bool) -> None:
-    """Prepare a worker process, which `isolates` the policies of others as its starter does."""
+    """Prepare a worker process, which `isolates` foreign policies as its starter does."""
     end_with_parent()
     end_group_with_work()
     if isolates:
@@ -130,7 +129,7 @@ class ClusterExecutor(Executor):
             return sum(self._client.nthreads().values())
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Hand a call over. Raises ClusterLost."""
+        """Submit a call. Raises ClusterLost."""
         ours: Future[T] = Future()
         with self._lost_on_error():
             self._executor.submit(fn, *args, **kwargs).add_done_callback(
@@ -144,7 +143,7 @@ class ClusterExecutor(Executor):
 
     @contextmanager
     def _lost_on_error(self) -> Iterator[None]:
-        """Turn whatever a client raises that has lost its scheduler into ClusterLost."""
+        """Turn any error of a client without its scheduler into ClusterLost."""
         try:
             yield
         except Exception as error:
@@ -173,7 +172,7 @@ def _connect(address: str) -> "Client":
         from dask.distributed import Client
     except ImportError as error:
         raise missing_extra("a cluster", "cluster", error) from error
-    # They print tracebacks of the same trouble that is told in one line below.
+    # They print tracebacks of the trouble that is reported in one line below.
     for logger in ("distributed", "distributed.client"):
         logging.getLogger(logger).setLevel(logging.CRITICAL)
     try:
@@ -192,8 +191,8 @@ def _connect(address: str) -> "Client":
 
 
 async def _try_connection(address: str) -> None:
-    """Raise what speaks against a connection, before there is a client: one that fails leaves a
-    thread that nobody can end.
+    """Raise connection errors before there is a client: a failed client leaves a thread that cannot
+    be ended.
     """
     from dask.distributed import Security
     from distributed.comm import connect

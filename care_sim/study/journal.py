@@ -1,5 +1,5 @@
-"""The journal of a study: one line for every finished task, so that nothing computed is lost; and
-the note that a folder holds while its study has not ended.
+"""The journal of a study, with a line for every finished task, so that no result is lost. Also the
+note in a folder while its study has not ended.
 
 A line is a row as JSON, the name of its study, and at the end a checksum of all before it.
 """
@@ -26,7 +26,7 @@ from care_sim.study.run_config import Row
 JOURNAL = "journal.jsonl"
 """Name of the file in a folder of results."""
 UNFINISHED = "unfinished.json"
-"""Name of the note, which is there from the begin of a study to its end."""
+"""Name of the note, which exists from the beginning of a study to its end."""
 _STUDY = "study"
 _CHECK = "check"
 LARGEST_JOURNAL = 2**32
@@ -35,9 +35,7 @@ _LINE = re.compile(rf'(\{{.*), "{_CHECK}": "([0-9a-f]{{16}})"\}}')
 
 
 class Finished(NamedTuple):
-    """The rows of a journal, each once, the studies that they are of, and how many of its lines are
-    damaged.
-    """
+    """The rows of a journal, each once, their studies, and the number of damaged lines."""
 
     rows: list[Row]
     studies: set[str]
@@ -47,9 +45,9 @@ class Finished(NamedTuple):
 class Journal:
     """Finished rows by digest, in a file of JSON lines that only ever grows.
 
-    Opening it reads the rows of earlier runs. A line that was torn by a crash, or whose checksum is
-    not that of its text, is passed over, so that its task runs again; `damaged` counts such lines.
-    `studies` are those of the rows; `study` is the one whose rows are added.
+    Opening it reads the rows of earlier runs. Lines that are torn by a crash, or have a wrong
+    checksum, are skipped, so that their tasks run again; `damaged` counts them. `studies` are those
+    of the rows; `study` is the one whose rows are added.
 
     Raises OSError when the folder cannot be written, and InvalidInput while another study writes
     there and for a journal larger than `LARGEST_JOURNAL`.
@@ -83,7 +81,7 @@ class Journal:
 
     @property
     def rows(self) -> list[Row]:
-        """All rows, those of other options too."""
+        """Return all rows, also those of other options."""
         return [*self._rows.values()]
 
     def __enter__(self) -> Self:
@@ -180,16 +178,15 @@ def _checksum(text: str) -> str:
 
 
 def note_begin(folder: Path, study: str, tasks: str, others: int, command: str) -> None:
-    """Leave in the folder what is played there, until `forget`: a study, its `tasks` in words, and
-    the `command` that plays them. The journal held `others` rows before that the study does not ask
-    for.
+    """Write the note into the folder, until `forget`: the study, its `tasks` in words, and the
+    `command` that plays them. `others` is the number of earlier journal rows outside the study.
     """
     note = {"study": study, "tasks": tasks, "others": others, "command": command}
     write_text(folder / UNFINISHED, json.dumps(note, indent=1) + "\n")
 
 
-def how_far(folder: Path) -> str:
-    """A line on the study that has begun in the folder and not ended; empty where none has.
+def describe_progress(folder: Path) -> str:
+    """Return a line on an unfinished study in the folder; empty without one.
 
     Raises InvalidInput for a journal that is too large.
     """
@@ -212,5 +209,5 @@ def how_far(folder: Path) -> str:
 
 
 def forget(folder: Path) -> None:
-    """The study in the folder has ended."""
+    """Remove the note: the study in the folder has ended."""
     (folder / UNFINISHED).unlink(missing_ok=True)

@@ -21,7 +21,7 @@ from care_sim.study.play_config import PlayConfig
 from care_sim.study.scene_play import play_through_film
 
 TIMED_SCANS = 8
-"""Full scans of a scene for which every detector is timed; as many before are not."""
+"""Timed full scans of a scene per detector, after as many untimed ones."""
 
 
 Samples = dict[str, list[JsonRow]]
@@ -30,8 +30,8 @@ Samples = dict[str, list[JsonRow]]
 
 @dataclass(frozen=True)
 class JudgedScene:
-    """One detector in one scene: its `boxes`, the CPU time of full scans, `scan_ms` (t,), and what
-    is in range in the official form: what it `reported` and what was `true`.
+    """One detector in one scene: its `boxes`, the CPU time of full scans, `scan_ms` (t,), and the
+    boxes in range in the official form, `reported` and `true`.
     """
 
     boxes: SceneBoxes
@@ -50,7 +50,7 @@ def judge_scene(configs: Sequence[PlayConfig]) -> list[JudgedScene]:
     true = _in_range(film, there, [np.zeros((len(one), 2)) for one in there])
     judged = []
     for config in configs:
-        # A detector may ask for more sweeps than another.
+        # Detectors may want different numbers of sweeps.
         if config.source != source:
             film, source = config.film(), config.source
         record = play_through_film(config, film)
@@ -69,7 +69,7 @@ def judge_scene(configs: Sequence[PlayConfig]) -> list[JudgedScene]:
 
 
 def _in_range(film: Film, reports: Sequence[Detections], velocities: Sequence[Floats]) -> Samples:
-    """By keyframe, the boxes that the scoring asks for; no speed of what is true is told: 0."""
+    """Return, by keyframe, the boxes that are scored. True speeds are unknown and set to 0."""
     made = {}
     for shot, report, speeds in zip(film.shots, reports, velocities, strict=True):
         near = planar_ranges(report.boxes) <= RANGE_M

@@ -1,7 +1,7 @@
 """Mechanism of a scene: one row per policy, of its own play and of the shared belief.
 
-Truth, that is which object lies behind a return, a camera box or a track, is read here for the
-scoring. No policy receives it.
+Truth (the object behind a return, a camera box or a track) is read here for the scoring. No policy
+receives it.
 """
 
 import time
@@ -34,16 +34,15 @@ from care_sim.study.run_config import FULL, Row
 from care_sim.study.scene_play import film_hash
 
 _COVERAGE = 0.5
-"""Share of the cells of an object's hull that hulls of tracks hold where it appears inside
+"""Share of an object's hull cells in hulls of tracks from which the object appears inside
 established coverage.
 """
 
 
 @dataclass(frozen=True)
 class NewObject:
-    """An object at its first sighting: what the scoring knows of its `appearance`; `hull` (n,) are
-    the cells that a perfect track of it would ask for, and `covered` says whether hulls of the
-    tracks hold half of them or more.
+    """An object at its first sighting, with its true `appearance`. `hull` (n,) are the cells of a
+    perfect track. `covered` is True if hulls of tracks hold at least half of them.
     """
 
     appearance: Appearance
@@ -52,8 +51,8 @@ class NewObject:
 
 
 def new_objects(loop: OpenLoop, belief: Belief, sightings: Sightings) -> list[NewObject]:
-    """The first sightings of the coming keyframe, in the order of `sightings.events`. `belief` is
-    what the policies are shown of it.
+    """Return the first sightings of the next keyframe, in the order of `sightings.events`. `belief`
+    is what the policies get.
     """
     annotations = loop.shot.annotations
     rows = np.flatnonzero(sightings.appearing(loop.index))
@@ -80,33 +79,32 @@ def new_objects(loop: OpenLoop, belief: Belief, sightings: Sightings) -> list[Ne
 
 
 def is_covered(hull: Cells, known: Cells) -> bool:
-    """Whether an object with this `hull` (n,) appears inside established coverage: hulls of tracks,
-    whose cells are `known` (m,), hold half of it or more.
+    """Return True if an object with this `hull` (n,) appears inside established coverage: hulls of
+    tracks, with cells `known` (m,), hold at least half of it.
     """
     return bool(np.isin(hull, known).sum() >= _COVERAGE * len(hull))
 
 
 FOUND = ""
-"""Stands for a reason where nothing was missed."""
+"""Placeholder reason without a miss."""
 ACCOUNT_COLUMNS = ("ttfds", "misses", "tracked", *(f"rays_{share}" for share in RAY_SHARES))
-"""What every row says of the events of its own play, in the order of `Sightings.events`: the
-censored times to first detection in keyframes, the reasons why they were missed at their first
-keyframe, the marks 1 or 0 of those that had a track already, and by share the rays that hit them at
-that keyframe.
+"""Columns of the events of a row's own play, in the order of `Sightings.events`. First the censored
+times to first detection in keyframes, and the reasons of misses at the first keyframe. Then marks
+(1 or 0) of events that already had a track, and rays that hit them then, by share.
 """
 DIFFERING = ("differing_keyframes", "differing_cells")
-"""What a policy that was asked has, and the driver has not."""
+"""Columns of other policies that the driver lacks."""
 RECEIVED = "received"
-"""Of every new object of the shared belief, the cells that the policy would give it."""
+"""Cells that the policy would give to every new object of the shared belief."""
 BELIEF_SUMS = ("filled", "filled_rho", "explained_cells", "untaken_cells")
-"""Sums over keyframes that the row of the driver has: those of `ReserveUse`."""
+"""Sums over keyframes in the driver's row: those of `ReserveUse`."""
 BELIEF_MARKS = ("pictured", "falsely_explained", "covered")
-"""What it says of every new object, 1 or 0."""
+"""Marks of every new object in the driver's row, 1 or 0."""
 
 
 def account_play(config: PlayConfig, film: Film, sightings: Sightings) -> Row:
     """Play a policy through the film of its scene, and account for its rays: `keyframes` and
-    `ACCOUNT_COLUMNS`. Raises InvalidInput for a policy that answers without a demand.
+    `ACCOUNT_COLUMNS`. Raises InvalidInput for a policy without a demand.
     """
     reasons: list[str] = []
     tracked: list[int] = []
@@ -134,7 +132,7 @@ def account_play(config: PlayConfig, film: Film, sightings: Sightings) -> Row:
                 rays.append(rays_by_share(seen.returns, served)[None])
         delays = env.score.delays.tolist()
         keyframes = len(env.keyframes)
-    # A reason was worked out for every event; only those of misses stand.
+    # Every event has a reason; only those of misses are kept.
     told = [reason if delay else FOUND for reason, delay in zip(reasons, delays, strict=True)]
     columns = (delays, told, tracked, *np.concatenate(rays).T.tolist())
     own = zip(ACCOUNT_COLUMNS, map(tuple, columns), strict=True)
@@ -145,9 +143,9 @@ def account_play(config: PlayConfig, film: Film, sightings: Sightings) -> Row:
 class SharedBelief:
     """Events of one policy's drive through a film.
 
-    `fired` are the cells of every keyframe by the name of the policy, `received` how many of them
-    lie in the hull of each new object; `entries` are those objects, and `reserve` what the camera's
-    wedges made of the reserve.
+    `fired` are the cells of every keyframe by policy name; `received` counts those in the hull of
+    each new object. `entries` are these objects, and `reserve` is the camera wedges' use of the
+    reserve.
     """
 
     fired: dict[str, list[Cells]]
@@ -159,8 +157,8 @@ class SharedBelief:
 def share_belief(
     driver: PlayConfig, others: Sequence[PlayConfig], film: Film, sightings: Sightings
 ) -> SharedBelief:
-    """Let the `driver` play its film, and ask the `others` at every keyframe what they would fire
-    there. They have its budget and its conditions.
+    """Let the `driver` play its film, and at every keyframe compute what the `others` would fire.
+    They have its budget and its conditions.
     """
     with driver.make_env(film) as env:
         policies = {config.policy: config.make_policy(env) for config in (*others, driver)}
@@ -170,7 +168,7 @@ def share_belief(
         shared = SharedBelief({name: [] for name in policies}, {name: [] for name in policies})
         rig = env.rig
         while not env.loop.over:
-            # What the policies make of the observation, in its precision.
+            # The policies read the observation, in its precision.
             belief = rig.read(observation)
             entries = new_objects(env.loop, belief, sightings)
             layers = camera_layers(belief, rig)
@@ -187,7 +185,9 @@ def share_belief(
 
 
 def play_mechanism(batch: Sequence[MechanismConfig]) -> list[Row | str]:
-    """Play one scene in a worker; return per play its row, or in one line why there is none."""
+    """Play one scene in a worker; return per play its row, or the reason of its failure in one
+    line.
+    """
     scene = result_or_reason(MechanismScene, batch)
     if isinstance(scene, str):
         return [scene] * len(batch)
@@ -195,7 +195,7 @@ def play_mechanism(batch: Sequence[MechanismConfig]) -> list[Row | str]:
 
 
 class MechanismScene:
-    """A scene whose driver has played and all others were asked.
+    """A scene that the driver has played, with the demands of all others.
 
     Raises InvalidInput where the film of the scene cannot be made.
     """
@@ -209,16 +209,15 @@ class MechanismScene:
         self._sightings = Sightings.of(
             self._film.name, shown, hidden=self._film.hidden, presence=config.presence
         )
-        # The full scan is a bound, with a budget of its own, and nobody to be asked.
+        # The full scan is a bound, with its own budget, and not compared on the shared belief.
         budgeted = [one for one in batch if one.policy != FULL]
         self._shared = self._share(budgeted) if budgeted else None
         self._shared_s = time.perf_counter() - started
 
     def row(self, config: MechanismConfig, sharers: int = 1) -> Row:
-        """The row of a policy; `docs/columns.md` explains its columns.
+        """Return the row of a policy; `docs/columns.md` explains its columns.
 
-        `wall_s` holds the share of the film, and of the shared belief, that falls to one of so many
-        rows.
+        `wall_s` includes an even share of the film's and the shared belief's time.
         """
         started = time.perf_counter()
         account = account_play(config, self._film, self._sightings)
@@ -239,8 +238,8 @@ class MechanismScene:
         return share_belief(driver, others, self._film, self._sightings)
 
     def _shared_columns(self, config: MechanismConfig) -> Row:
-        """Return the columns of what the policy would have done on the shared belief; the driver's
-        row describes that belief itself.
+        """Return the columns of the policy on the shared belief; the driver's row describes that
+        belief itself.
         """
         columns: Row = dict.fromkeys((*DIFFERING, RECEIVED, *BELIEF_SUMS, *BELIEF_MARKS))
         shared = self._shared

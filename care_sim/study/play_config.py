@@ -37,8 +37,8 @@ _PLAIN = [name for name in _FILMED if name not in COLUMNS_WHERE_CHANGED]
 
 @dataclass(frozen=True)
 class PlayConfig(Conditions, RunConfig):
-    """Everything that decides a play: the scene of a source, the policy, the detector, who counts
-    as present at scene start (`care_sim.evaluation.sightings`), the conditions.
+    """Everything that decides a play: the scene of a source, the policy, the detector, the rule of
+    presence at scene start (`care_sim.evaluation.sightings`), the conditions.
 
     Raises InvalidInput for a condition, budget or name that is not allowed, and for a parameter
     that the policy does not have. Whether the scene can be read shows when it is played.
@@ -70,7 +70,7 @@ class PlayConfig(Conditions, RunConfig):
         self.check_task(sensor_setup(self.source.sensor).grid)
 
     def of_scene(self, scene: Scene, floor_seed: int) -> Self:
-        """The same in another scene with another floor, which need no check."""
+        """Return the same play in another scene with another floor, which need no check."""
         return self.changed(scene=scene, floor_seed=floor_seed)
 
     def film(self) -> Film:
@@ -99,7 +99,7 @@ class PlayConfig(Conditions, RunConfig):
 
     def installed(self) -> list[str | None]:
         """Return the hashes of installed code: those of the base, of the detector, of the files
-        that its parameters name and that it reads, and of a source that is not built in.
+        that it reads or its parameters name, and of a foreign source.
         """
         return [
             *super().installed(),
@@ -138,8 +138,8 @@ def play_grid(
     camera_latencies: Sequence[int] = (0,),
     **common: Any,
 ) -> list[PlayConfig]:
-    """All combinations, scene by scene and without repeats; `full` plays once for all that it does
-    not feel.
+    """Return all combinations, scene by scene and without repeats; `full` plays once for all
+    conditions that do not affect it.
 
     `common` are further fields of `PlayConfig`.
     """
@@ -181,9 +181,8 @@ def listed_plays(configs: Sequence[PlayConfig]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class MechanismConfig(PlayConfig):
-    """A play of `policy`, which is also asked what it would fire on the belief of `driver`, the
-    policy that plays there. Raises InvalidInput as `PlayConfig` does, and for a driver that cannot
-    be one.
+    """A play of `policy`, with its demands on the belief of `driver`, the policy that plays. Raises
+    InvalidInput as `PlayConfig` does, and for an impossible driver.
     """
 
     driver: str = REFERENCE
@@ -192,7 +191,7 @@ class MechanismConfig(PlayConfig):
 
     def __post_init__(self) -> None:
         check_policy(self.driver)
-        # Its budget is all cells, so that nobody could differ from it at the budget that is asked.
+        # Its budget is all cells, so no policy could differ from it at another budget.
         if self.driver == FULL:
             raise InvalidInput(f"driver must be a policy with a budget, got {FULL!r}")
         super().__post_init__()
@@ -213,11 +212,11 @@ def mechanism_plays(
     driver: str,
     **common: Any,
 ) -> list[MechanismConfig]:
-    """The driver, the `policies` and the full scan, scene by scene; `common` are further fields of
-    `PlayConfig`, but for the floor, of which there is one.
+    """Return the driver, the `policies` and the full scan, scene by scene. `common` are further
+    fields of `PlayConfig`, except the single floor.
 
-    Raises InvalidInput for parameters of the driver: all rows of a scene name one driver, and none
-    has a column for them.
+    Raises InvalidInput for parameters of the driver: rows name the driver, but have no column for
+    its parameters.
     """
     if own := parameters_for(driver, common.get("policy_parameters", ())):
         raise InvalidInput(

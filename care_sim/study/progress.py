@@ -1,6 +1,4 @@
-"""How far a study has come, and how long the rest of it will take: a bar on a terminal, lines from
-time to time elsewhere.
-"""
+"""Progress of a study and its remaining time: a bar on a terminal, occasional lines elsewhere."""
 
 import math
 import sys
@@ -27,7 +25,7 @@ _LINE_S = 60.0
 _FIRST_ROUND = "the first take longer on a machine that has not played before, which compiles code"
 
 Show = Callable[[int, str], None]
-"""Shows how many tasks are done and, in words, what is left."""
+"""Shows the number of finished tasks and, in words, the remaining time."""
 
 
 def run_with_progress(
@@ -37,9 +35,9 @@ def run_with_progress(
     make_executor: ExecutorFactory,
     kind: ResultsFormat,
 ) -> list[Failure]:
-    """Run the tasks that the journal does not hold yet, and show on stderr how far they are.
+    """Run the tasks that the journal lacks, and show progress on stderr.
 
-    Returns those that failed; see `care_sim.study.runner.run_all`.
+    Returns failed tasks; see `care_sim.study.runner.run_all`.
     """
     waiting = [config for config in configs if config.key not in journal]
     started = time.monotonic()
@@ -55,11 +53,11 @@ def run_with_progress(
 
 
 class ProgressReporter(RunListener):
-    """Shows how far a run is, and how long the rest of it should take: as long as the mean of the
-    tasks of the same policy that have ended, or of all tasks.
+    """Shows the progress of a run, and its remaining time. The estimate is the mean of ended tasks
+    of the same policy, or of all tasks.
 
-    What was begun before the first task had ended tells nothing of the rest, as the first round of
-    a training does not (`care_sim.training.run`): it may have compiled what is not compiled yet.
+    Tasks begun before the first one ended are ignored, as in trainings (`care_sim.training.run`):
+    they may have compiled code.
     """
 
     def __init__(self, waiting: Iterable[RunConfig], show: Show, total: int) -> None:
@@ -74,17 +72,17 @@ class ProgressReporter(RunListener):
         self._any_failed = False
 
     def begun(self, batch: Sequence[RunConfig]) -> None:
-        """Remember what is begun before anything has ended."""
+        """Remember tasks that begin before any has ended."""
         if self._waiting.total() == self._new:
             self._first_round.update(batch)
 
     def playing(self, workers: int) -> None:
-        """Show what is left with so many workers."""
+        """Show the remaining time with this many workers."""
         self._workers = workers
         self._tell()
 
     def finished(self, config: RunConfig, row: Row | None) -> None:
-        """Learn how long a task took."""
+        """Record the time of a task."""
         self._waiting[config.policy] -= 1
         if row and config not in self._first_round:
             took_s = self._seconds.get(config.policy, 0.0) + row["wall_s"]
@@ -93,14 +91,14 @@ class ProgressReporter(RunListener):
         self._tell()
 
     def failed(self, failure: Failure) -> None:
-        """Tell the first failure at once: who made a mistake need not wait for all the others."""
+        """Report the first failure at once, so that users need not wait for the others."""
         if not self._any_failed and self._waiting.total():
             with suppress(OSError):
                 report_problems([f"failed: {failure}; the others go on, Ctrl-C stops"])
         self._any_failed = True
 
     def interrupted(self) -> None:
-        """Say why it takes a moment."""
+        """Explain the delay."""
         with suppress(OSError):  # the terminal may be what is gone
             print("interrupted: what is played now is finished first", file=sys.stderr, flush=True)
 
@@ -134,8 +132,8 @@ def shown_progress(total: int, unit: str) -> Iterator[Show]:
         yield ProgressLines(total, unit)
         return
     columns = (TextColumn(unit), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    # What is printed meanwhile goes above the bar where both share the terminal. A stdout that goes
-    # to a file must not pass through it.
+    # Output goes above the bar if both share the terminal. A stdout to a file must not pass through
+    # the bar.
     shared = sys.stdout.isatty()
     left = TextColumn("{task.fields[left]}")
     with Progress(*columns, left, console=Console(stderr=True), redirect_stdout=shared) as progress:
@@ -144,7 +142,9 @@ def shown_progress(total: int, unit: str) -> Iterator[Show]:
 
 
 class ProgressLines:
-    """A line after ten seconds, then every minute, or sooner when another twentieth is done."""
+    """Prints a line after ten seconds, then every minute, or sooner when another twentieth is
+    done.
+    """
 
     def __init__(self, total: int, unit: str, clock: Callable[[], float] = time.monotonic):
         self._total = total
@@ -166,7 +166,7 @@ class ProgressLines:
 
 
 def rounded_duration(seconds: float) -> str:
-    """A duration as people say it, rounded: 45 s, 12 min, 3 h 20 min."""
+    """Return a rounded duration: 45 s, 12 min, 3 h 20 min."""
     if seconds < 90:
         return f"{seconds:.0f} s"
     minutes = round(seconds / 60)

@@ -1,4 +1,4 @@
-"""Where results come from: the code, the libraries and the machine that made them."""
+"""Provenance of results: code, libraries and machine."""
 
 import json
 import platform
@@ -42,9 +42,9 @@ _EXTRAS = ("mujoco-core", "open3d", "open3d-cpu", "panda-gym", "torch")
 """Libraries of detectors, policies and measurements, recorded where they are installed."""
 
 SHIPPED = Path(care_sim.__file__).parent / "policies" / "learned" / "shipped"
-"""Where the weights lie that come with the package."""
+"""Folders of the shipped weights."""
 SESSION = uuid4().hex
-"""Names this run of the program; no other run has it."""
+"""Unique name of this run of the program."""
 
 
 def code_digest() -> str:
@@ -65,7 +65,7 @@ def policy_digest(policy: str) -> str | None:
         return ""
     if not are_isolated():
         return _entry_digest(POLICIES.entry(policy))
-    # The hash is made of loaded code, and that of others is loaded in its process alone.
+    # The hash covers loaded code, and isolated code is loaded only in its process.
     process = policy_process(policy)
     digest: str | None = process.read(json.loads, process.ask(policy_digest, policy))
     return digest
@@ -77,19 +77,19 @@ def detector_digest(detector: str) -> str | None:
 
 
 def detector_files(detector: str, parameters: Parameters) -> list[str | None]:
-    """Hashes of the files that a detector says it reads, besides those that its parameters name."""
+    """Hash the files that a detector declares, besides those in its parameters."""
     named = [file_digest(path) for _, value in parameters for path in paths_in(value)]
     return [*map(file_digest, _files_read(detector, parameters, tuple(named)))]
 
 
-# The detector is made to hear of its files: once, not for each of many plays.
+# The detector is made to list its files: once, not per play.
 @lru_cache
 def _files_read(
     detector: str, parameters: Parameters, _named: tuple[str | None, ...]
 ) -> tuple[Path, ...]:
     try:
         return files_read(detector, dict(parameters))
-    # Nothing is played with a detector that cannot be made here.
+    # A detector that cannot be made here plays nothing.
     except (InvalidInput, MissingExtra):
         return ()
 
@@ -101,8 +101,8 @@ def scenario_digest(scenario: str) -> str | None:
 
 
 def source_digests(source: Source) -> list[str | None]:
-    """The same of a source, and what else decides its films: its options, and the files that they
-    name. Nothing for a built-in source, whose rows tell it all.
+    """Return the hash of a source, its options, and the files in its options. Nothing for a
+    built-in source, whose rows hold everything.
     """
     # Imported here because the kinds of recordings load SciPy and PyArrow.
     from care_sim.sources.installed import SOURCES, Installed
@@ -110,7 +110,7 @@ def source_digests(source: Source) -> list[str | None]:
     if not isinstance(source, Installed):
         return []
     named = [file_digest(path) for _, value in source.options for path in paths_in(value)]
-    # Where a file lies decides nothing.
+    # The place of a file does not matter.
     plain = [pair for pair in source.options if not isinstance(pair[1], Path)]
     return [_entry_digest(SOURCES.entry(source.name)), repr(plain), *named]
 
@@ -121,10 +121,10 @@ def _entry_digest(entry: EntryPoint) -> str | None:
         return None
     digests = [entry.dist.version if entry.dist else ""]
     for name, path in sorted(files.items()):
-        # An edit of code that is loaded changes nothing in this process. Weights and tables are
-        # read again for every episode, and so is their hash.
+        # Edits of loaded code have no effect in this process. Weights and tables are read again for
+        # every episode, and hashed again.
         digest = _loaded(path) if path.suffix in CODE else file_digest(path)
-        # A folder with too many files to read: nothing can be promised about it.
+        # A folder with too many files to read has no reliable hash.
         if digest is None:
             return None
         digests.append(f"{name} {digest}")
@@ -179,7 +179,7 @@ def machine() -> dict[str, str | int]:
 
 
 def machine_line() -> str:
-    """The machine in a few words, for the cards of weights."""
+    """Return the machine in a few words, for the cards of weights."""
     here = machine()
     return f"{here['processor']}, {here['cores']} cores, {here['system']}"
 

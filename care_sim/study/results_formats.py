@@ -1,5 +1,5 @@
-"""The kinds of results: episodes of the closed loop, those of the vehicle study, plays of the open
-loop, and plays of it whose rays are accounted for; how each is played and how it is kept.
+"""The kinds of results, how each is played and stored. Kinds: episodes of the closed loop, episodes
+of the vehicle study, plays of the open loop, and plays with an account of their rays.
 """
 
 from collections.abc import Callable, Sequence
@@ -49,27 +49,25 @@ from care_sim.study.vehicle_play import (
 
 @dataclass(frozen=True)
 class ResultsFormat:
-    """How one kind of results is played and kept.
+    """How one kind of results is played and stored.
 
-    `file` holds the rows that are kept, in columns of the `schema`.
+    `file` holds the stored rows, in columns of the `schema`.
     """
 
     task: str
-    """What one of its tasks is called."""
+    """Name of a task."""
     play_batch: PlayBatch
     """Plays a batch of tasks."""
     most: int | None
-    """So many tasks are a batch at most; None where all belong together that share something."""
+    """Most tasks of a batch; None keeps all tasks together that share something."""
     kept_rows: Callable[[Sequence[Row]], list[Row]]
-    """The rows that are kept, made of all rows as they were played: some columns compare a row with
-    others.
-    """
+    """Makes the stored rows from all played rows: some columns compare a row with others."""
     file: str
     schema: Schema
     listed: Callable[[Any], dict[str, Any]]
-    """Configurations as plain data."""
+    """Converts configurations to plain data."""
     further_files: Callable[[Sequence[Row]], dict[str, dict[str, Any]]] = lambda _rows: {}
-    """Columns by file name, made of the rows as they were played."""
+    """Makes columns by file name from the played rows."""
 
     @property
     def unit(self) -> str:
@@ -87,8 +85,8 @@ _BY_WRITER = {
     "sensor_setup": as_optional(TEXT),
     "cell_order": CONDITION_COLUMNS["cell_order"],
 }
-"""Columns that every study writes. Older files and those of others may lack them: a condition that
-they do not know was at its default.
+"""Columns that every study writes. Older or foreign files may lack them: a missing condition was at
+its default.
 """
 _OF_EPISODES = (
     _BY_WRITER
@@ -103,9 +101,9 @@ _OF_EPISODES = (
     }
     | {name: CONDITION_COLUMNS[name] for name in COLUMNS_WHERE_CHANGED}
 )
-"""Those of every study of the closed loop."""
-# What a file must have as a column is optional in a row where it tells of what did not happen: a
-# detection, a view of the actor, a collision.
+"""Columns of every study of the closed loop."""
+# A required column may be empty in a row if its event did not happen: a detection, a view of the
+# actor, a collision.
 _EPISODES = Schema(
     {name: CONDITION_COLUMNS.get(name, TEXT) for name in PLAIN_FIELDS if name not in _OF_EPISODES}
     | {
@@ -133,7 +131,7 @@ _ANY_PLAY = {
     "floor_seed": COUNT,
     "ttfds": _COUNTS,
 }
-"""What every row of the open loop has."""
+"""Columns of every row of the open loop."""
 _OF_SOME_PLAYS = {
     "recording": as_optional(TEXT),
     "camera_detections": as_optional(TEXT),
@@ -163,7 +161,7 @@ _MECHANISM = Schema(
     _ANY_PLAY
     | dict.fromkeys(ACCOUNT_COLUMNS, _COUNTS)
     | {"driver": TEXT, "misses": Column("lists of texts")}
-    # The full scan is not asked on the shared belief; what is of that belief, the driver's row has.
+    # The full scan is not compared on the shared belief; the driver's row describes that belief.
     | dict.fromkeys((*DIFFERING, *BELIEF_SUMS), as_optional(COUNT))
     | dict.fromkeys((RECEIVED, *BELIEF_MARKS), as_optional(_COUNTS)),
     _BY_WRITER | _OF_SOME_PLAYS,
@@ -233,7 +231,7 @@ UNREAD = frozenset(
     {"keyframes", "wall_s", "peak_rss_mb", "regret_m", "censored", *DECISION_MS}
     | {field.name for field in fields(DriveOutcome)}
 )
-"""Columns that this version writes and no report reads."""
+"""Columns that this version writes but no report reads."""
 _PARAMETERS = frozenset(
     {
         *PLAIN_FIELDS,
@@ -252,10 +250,10 @@ _PARAMETERS = frozenset(
 
 
 def results_format_in(folder: Path) -> ResultsFormat:
-    """The format of the results in a folder; that of episodes where there are none."""
+    """Return the format of the results in a folder, by default that of episodes."""
     return next((kind for kind in RESULTS_FORMATS if (folder / kind.file).is_file()), EPISODES)
 
 
 def is_parameter(name: str) -> bool:
-    """Whether a column of rows holds what a task was given."""
+    """Return True if a column of rows holds a task's parameter."""
     return name in _PARAMETERS or name.startswith(PARAMETERS)

@@ -1,5 +1,5 @@
-"""Configuration that a study hands to its workers: a policy with its parameters, and its world,
-with a digest as its name.
+"""Configuration of a worker's task: a policy with its parameters, and its world, identified by a
+digest.
 
 The configurations of the closed loop (`care_sim.study.episode_config`) and of the open loop
 (`care_sim.study.play_config`) have this base.
@@ -31,23 +31,23 @@ from care_sim.study.rows.parameters import Parameters, checked_parameters
 Row = dict[str, Any]
 
 MOST_TASKS = 100_000
-"""Tasks of a study, whose rows it holds in memory: 10 to 20 kB each, 1 to 2 GB in all."""
+"""Most tasks of a study, which holds its rows in memory: 10 to 20 kB each, 1 to 2 GB in all."""
 
 REFERENCE = "care"
-"""The policy that others are compared with."""
+"""The reference policy."""
 FULL = "full"
 """The policy that scans everything."""
 _OWNERS = ("detector", "scenario", "policy")
-"""What has parameters of its own."""
+"""Kinds with their own parameters."""
 _NAMED = {"scenario", "scene", "policy", "budget", "seed"}
-"""Columns that the name of a task tells."""
+"""Columns in the name of a task."""
 
 
 class RunConfig(ABC):
     """Everything that decides a row of a study. Subclasses are frozen dataclasses.
 
-    A subclass checks what can be known of its fields alone. The environment and the policy refuse
-    the rest when they are made: `try_out` makes them, and so does the first play.
+    A subclass checks its fields. The environment and the policy check the rest when they are made,
+    by `try_out` or by the first play.
     """
 
     policy: str
@@ -60,13 +60,13 @@ class RunConfig(ABC):
     columns: ClassVar[Sequence[str]]
     """Fields that are a column of every row."""
     usual: ClassVar[Mapping[str, Any]]
-    """Fields that are a column where they differ from this value. Without the column the rows, and
-    the digests made of them, stay as they were before there was a choice.
+    """Fields that are a column if they differ from this value. Otherwise rows and their digests
+    equal those of older versions.
     """
 
     @abstractmethod
     def place(self) -> Row:
-        """Columns that say where the task is played: the sensor set-up, the source of a scene."""
+        """Columns of the task's place: the sensor set-up, the source of a scene."""
 
     @property
     @abstractmethod
@@ -81,15 +81,15 @@ class RunConfig(ABC):
     @property
     @abstractmethod
     def batch(self) -> Hashable:
-        """Tasks with equal ones may be handed to one worker together."""
+        """One worker may play tasks with equal keys together."""
 
     @abstractmethod
     def try_out(self) -> None:
         """Make environment and policy. Raises what they do not accept."""
 
     def row(self) -> Row:
-        """Every parameter flat; those of detector, scenario and policy as `detector.NAME`,
-        `scenario.NAME`, `policy.NAME`.
+        """Return all parameters as columns; those of detector, scenario and policy as
+        `detector.NAME`, `scenario.NAME`, `policy.NAME`.
         """
         plain = {name: getattr(self, name) for name in self.columns}
         chosen = {name: getattr(self, name) for name in self.usual}
@@ -101,7 +101,7 @@ class RunConfig(ABC):
 
     @property
     def label(self) -> str:
-        """A short name for people: the name, and what departs from the defaults."""
+        """Return a short readable name: the name, and parameters other than defaults."""
         told = {*self.place(), *_NAMED} - {"sensor"}
         usual = DEFAULTS | {"detector": PROXY}
         changes = {n: v for n, v in self.row().items() if n not in told and v != usual.get(n)}
@@ -110,18 +110,17 @@ class RunConfig(ABC):
     def make_policy(self, env: gymnasium.Env[Any, Any]) -> Policy:
         """The policy for the environment."""
         policy = make_policy(self.policy, env, **dict(self.policy_parameters))
-        # For what it remembers: files of code are hashed once per process, as they are when first
-        # asked for. Making the policy may have loaded more of them, and an edit while it plays must
-        # not change what `digest` says of them.
+        # Fills the cache: files of code are hashed once per process, at first use. Making the
+        # policy may have loaded more files, and an edit during the play must not change `digest`.
         self.installed()
         return policy
 
     def digest(self, code: str | None = None) -> str:
-        """Hash of the configuration and of all code and files that decide the row; `code` is the
-        `code_digest` where the caller has it.
+        """Hash the configuration and all code and files that decide the row; `code` is the
+        `code_digest`, if known.
 
-        A row carries the digest that its worker worked out after playing it. Where code has no
-        source to read, the name of this run stands for it, so that no other run has the digest.
+        A row holds the digest that its worker computed after playing it. Code without readable
+        source is replaced by the name of this run, so that no other run has the digest.
         """
         own = (self._session if digest is None else digest for digest in self.installed())
         # Sorted, so that the order of the columns does not matter.
@@ -130,33 +129,33 @@ class RunConfig(ABC):
         return hashlib.sha256(json.dumps(effective).encode()).hexdigest()[:16]
 
     def installed(self) -> list[str | None]:
-        """Hashes of what else decides the row: code of other packages, and the files that
-        parameters name. None stands for code that has no source to read.
+        """Return hashes of other packages' code, and of the files in parameters. None stands for
+        code without readable source.
         """
         return [policy_digest(self.policy), *files_in(self.policy_parameters)]
 
     @cached_property
     def key(self) -> str:
-        """The digest when this process first asked for it.
+        """The digest at its first use in this process.
 
-        The process that leads a study files the row under it, whatever changes while it runs, and
+        The leading process of a study stores the row under it, whatever changes meanwhile, and
         refuses a row with another digest.
         """
         return self.digest()
 
     def __getstate__(self) -> dict[str, Any]:
-        # Workers are sent no key, so that each works out its own and one with other code shows.
-        # They are sent `_session`, which has no meaning of its own there. It is set once the key
-        # was asked for, as the study does before it hands out tasks.
+        # Workers get no key, so that each computes its own, which reveals other code. They get
+        # `_session`, which only the leading process defines. It is set with the key, before the
+        # study submits tasks.
         return {name: value for name, value in vars(self).items() if name != "key"}
 
     @cached_property
     def _session(self) -> str:
-        """The name of the run that leads the study; stands for code that cannot be read."""
+        """The name of the leading run, which replaces code that cannot be read."""
         return SESSION
 
     def changed(self, **values: object) -> Self:
-        """The same with other values of fields that need no check."""
+        """Return a copy with other values of fields that need no check."""
         # dataclasses.replace would run every check again for each task of a large study.
         other = copy(self)
         for name, value in values.items():
@@ -164,8 +163,8 @@ class RunConfig(ABC):
         return other
 
     def check_task(self, grid: Grid) -> None:
-        """Check policy, detector and budget for the cells of a grid, and bring all parameters into
-        the form in which files hold them. Raises InvalidInput.
+        """Check policy, detector and budget for the cells of a grid, and convert all parameters to
+        the form of files. Raises InvalidInput.
         """
         for owner in _OWNERS:
             name = f"{owner}_parameters"
@@ -178,31 +177,31 @@ class RunConfig(ABC):
         check_policy(self.policy)
         check_detector(self.detector)
         hardware_of(self.firing, grid).budget_cells(self.budget)
-        # The code of somebody else is loaded when it plays.
+        # Foreign code is loaded when it plays.
         if self.policy in POLICIES.built_in:
             check_parameters(self.policy, maker(self.policy), dict(self.policy_parameters))
 
 
 def effective_conditions(policy: str, budget: float, conditions: dict[str, Any]) -> dict[str, Any]:
-    """Budget and conditions as a policy feels them. The full scan has one budget, and asks neither
-    camera nor allocator.
+    """Return the effective budget and conditions of a policy. The full scan has one budget, and
+    uses neither camera nor allocator.
     """
     check_policy(policy)
     felt = conditions | {"budget": budget}
     if parameters := conditions.get("policy_parameters"):
         felt["policy_parameters"] = parameters_for(policy, parameters)
     if policy == FULL:
-        # Whatever it does not feel takes the default, so that equal full scans are one
-        # configuration and run once.
+        # Reset conditions that `full` ignores, so that equal full scans are one configuration and
+        # run once.
         felt |= {"budget": 1.0} | {name: DEFAULTS[name] for name in UNUSED_BY_FULL_SCAN}
     return felt
 
 
 def parameters_for(policy: str, parameters: Parameters) -> Parameters:
-    """The parameters of one policy among those for several: NAME is for all, POLICY.NAME for that
-    policy alone.
+    """Return the parameters of one policy among those for several: NAME is for all, POLICY.NAME
+    only for that policy.
 
-    Raises InvalidInput for a name before the point that is no policy.
+    Raises InvalidInput for an unknown policy before the dot.
     """
     # rpartition leaves everything in the last part where there is no point.
     parted = [(*name.rpartition("."), value) for name, value in parameters]
@@ -227,7 +226,7 @@ def flat(prefix: str, parameters: Parameters) -> Row:
 
 
 def check_size(tasks: int) -> None:
-    """Raise InvalidInput for more tasks than a study can hold; asked before they are made."""
+    """Raise InvalidInput for more tasks than a study can hold; call it before they are made."""
     if tasks > MOST_TASKS:
         raise InvalidInput(
             f"the tasks of a study must be at most {MOST_TASKS:,}, got {shown(tasks)}, because all "
@@ -236,8 +235,8 @@ def check_size(tasks: int) -> None:
 
 
 def collected(plain: Sequence[dict[str, Any]], axis: str, plural: str) -> dict[str, Any]:
-    """Configurations as plain data, each once, with all values of an axis under its plural and all
-    policies under `policies`. Shared values are stored once, under `common`: otherwise large
+    """Return configurations as plain data, each once. All values of an axis are under its plural,
+    all policies under `policies`. Shared values are stored once, under `common`: otherwise large
     studies write megabytes.
     """
     listed = _grouped(_grouped(plain, axis, plural), "policy", "policies")

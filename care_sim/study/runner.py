@@ -15,7 +15,9 @@ from care_sim.study.run_config import Row, RunConfig
 
 Batch = Sequence[RunConfig]
 PlayBatch = Callable[[Any], list[Row | str]]
-"""Plays a batch in a worker, and gives for each task its row, or in one line why there is none."""
+"""Plays a batch in a worker, and returns for each task its row, or the reason of its failure in one
+line.
+"""
 _InFlight = dict[Future[list[Row | str]], Batch]
 """The batches that are being played."""
 
@@ -25,14 +27,14 @@ _OTHER_CODE = (
     "the study ran"
 )
 _DEADLY = 3
-"""After a policy has killed so many workers, the rest of its tasks is not tried any more."""
+"""Killed workers after which a policy's other tasks are not tried."""
 _QUIET_S = 2.0
-"""The listener hears at least this often how many workers play."""
+"""Longest interval between reports of the number of workers."""
 
 
 @dataclass(frozen=True)
 class Failure:
-    """A task that did not finish, and why."""
+    """A task that did not finish, with its reason."""
 
     config: RunConfig
     reason: str
@@ -69,22 +71,22 @@ def in_batches(tasks: Sequence[RunConfig], most: int | None = None) -> list[list
 
 
 class RunListener:
-    """Follows a run; this base class keeps quiet."""
+    """Follows a run; this base class does nothing."""
 
     def playing(self, workers: int) -> None:
-        """So many workers play now; told every few seconds at least."""
+        """Called with the number of workers, at least every few seconds."""
 
     def begun(self, batch: Batch) -> None:
-        """A batch is handed to a worker."""
+        """Called when a batch goes to a worker."""
 
     def finished(self, config: RunConfig, row: Row | None) -> None:
-        """A task has ended; None when it failed."""
+        """Called when a task has ended, with None for a failure."""
 
     def failed(self, failure: Failure) -> None:
-        """A task has ended without a row, and why; told after `finished`."""
+        """Called after `finished` when a task has ended without a row, with the reason."""
 
     def interrupted(self) -> None:
-        """Somebody wants to stop: what is played now is finished first."""
+        """Called at an interrupt: running batches are finished first."""
 
 
 def run_all(
@@ -98,20 +100,20 @@ def run_all(
 ) -> list[Failure]:
     """Run every task that the journal does not hold yet, in their order; returns those that failed.
 
-    A batch has up to `most` tasks, and the last ones are shared out among all workers; None keeps
-    all together that belong together.
+    A batch has up to `most` tasks, and the last ones are shared among all workers; with None
+    related tasks stay together.
 
-    An interrupt waits for the batches in flight and leaves all that is finished in the journal.
-    When a worker dies, the batches then in flight are run again one by one, and in halves, so that
-    only the guilty task fails; when a policy has killed `_DEADLY` workers, its other tasks are not
-    tried. Raises ClusterLost when the scheduler of a cluster is gone.
+    An interrupt waits for running batches and leaves all finished tasks in the journal. After the
+    death of a worker, running batches are run again one by one, and in halves, so that only the
+    guilty task fails. After a policy has killed `_DEADLY` workers, its other tasks are not tried.
+    Raises ClusterLost when the scheduler of a cluster is gone.
     """
     run = _Run(journal, workers, make_executor, listener or RunListener(), play_batch, most)
     due = [config for config in configs if config.key not in journal]
     waiting = deque(in_batches(due, most))
     while waiting:
-        # A pool does not say which of its processes died of which batch. All that it had are
-        # suspects, and each is tried on its own before the rest goes on.
+        # A pool does not report which batch killed a process. All its batches are suspects, and
+        # each runs alone before the rest continues.
         for suspect in run.run_together(waiting):
             run.run_alone(suspect)
     return run.failures
@@ -170,8 +172,8 @@ class _Run:
             wait([future])
         if self._kept(batch, future):
             return
-        # A batch of one that dies alone is guilty. A larger one is halved until the guilty task
-        # stands alone.
+        # A single task that dies alone is guilty. A larger batch is halved until the guilty task is
+        # alone.
         if len(batch) == 1:
             self._deaths[batch[0].policy] += 1
             self._fail(batch, DIED)
@@ -190,8 +192,8 @@ class _Run:
     def _submit_waiting(
         self, executor: Executor, waiting: "deque[list[RunConfig]]", in_flight: _InFlight
     ) -> None:
-        """Hand over as many batches as are played at once. A cluster without workers gets one,
-        which waits for a worker.
+        """Submit as many batches as run in parallel. A cluster without workers gets one, which
+        waits for a worker.
         """
         workers = parallel_batches(executor, self._workers)
         self._listener.playing(workers)
@@ -205,7 +207,7 @@ class _Run:
 
     def _collect_finished(self, in_flight: _InFlight) -> None:
         done, _ = wait(in_flight, _QUIET_S, FIRST_COMPLETED)
-        # Whole batches first, so that they are in the journal before a death is told.
+        # Whole batches first, so that they are in the journal before a death is reported.
         for future in sorted(done, key=lambda future: future.exception() is not None):
             if not self._kept(in_flight[future], future):
                 raise BrokenExecutor
@@ -243,10 +245,10 @@ class _Run:
             self._listener.failed(self.failures[-1])
 
     def _submit(self, executor: Executor, batch: Batch) -> Future[list[Row | str]]:
-        """Hand a batch over, and tell the listener.
+        """Submit a batch, and notify the listener.
 
-        A fork server may not answer at once on a busy machine, or be killed while it starts a
-        worker. It is asked again: another one takes its place.
+        A fork server may be slow on a busy machine, or be killed while it starts a worker. The call
+        is repeated: another server replaces it.
         """
         self._listener.begun(batch)
         for wait_s in (0.5, 2.0):
@@ -258,8 +260,8 @@ class _Run:
 
 
 def _part_last(waiting: "deque[list[RunConfig]]", workers: int) -> None:
-    """Cut the first of the last batches to a worker's share of what waits, so that none of them
-    stands idle while another has much to do.
+    """Cut the first of the last batches to a worker's share of waiting tasks, so that no worker
+    idles while another has many tasks.
     """
     if len(waiting) < 2 * workers:
         share = -(-sum(map(len, waiting)) // workers)

@@ -30,7 +30,7 @@ from care_sim.study.play_config import PlayConfig
 from care_sim.study.run_config import FULL, REFERENCE, Row
 
 _EVENT_COLUMNS = ("keyframe", "object", "class", "range_m", "azimuth", "chances")
-"""What is known of an event before any policy plays."""
+"""Columns of an event that do not depend on policies."""
 _NAMES = (
     "source",
     "scene",
@@ -53,8 +53,8 @@ def event_sightings(score: SceneScore) -> dict[str, list[Any]]:
 
 
 def event_columns(rows: Sequence[Row]) -> dict[str, Any]:
-    """The events of all plays as columns of one table: the names of the play, what was seen where,
-    and when it was found.
+    """Return the events of all plays as columns of one table: the play's names, the sighting, and
+    the time of detection.
     """
     # One entry per event. The names of a play repeat over its events.
     counts = [len(row["ttfds"]) for row in rows]
@@ -71,12 +71,14 @@ def event_columns(rows: Sequence[Row]) -> dict[str, Any]:
 
 
 DECISION_MS = ("policy_p50_ms", "policy_p99_ms")
-"""Columns of how long the policy took for a keyframe."""
+"""Columns of the policy's time per keyframe."""
 SUMS = tuple(field.name for field in fields(Tally))
 
 
 def play_scene(batch: Sequence[PlayConfig]) -> list[Row | str]:
-    """Play one scene in a worker; return per play its row, or in one line why there is none."""
+    """Play one scene in a worker; return per play its row, or the reason of its failure in one
+    line.
+    """
     scene = result_or_reason(ScenePlayer, batch[0])
     if isinstance(scene, str):
         return [scene] * len(batch)
@@ -87,11 +89,11 @@ def play_scene(batch: Sequence[PlayConfig]) -> list[Row | str]:
 class PlayRecord:
     """Record of a play.
 
-    `tracks`, `explained` and `released` are means per keyframe: tracks held, camera detections that
-    a forecast explains, and cells of the full hulls that exploitation does not ask for; `released`
-    is None of a policy that exploits no set. `expected` are the columns of expected counts, empty
-    for a detector that does not detect by chance. `decisions_ms` are the milliseconds of every call
-    of the policy, its process included. `wall_s` is in seconds.
+    `tracks`, `explained` and `released` are means per keyframe: tracks, explained camera
+    detections, and cells of full hulls that exploitation does not demand. `released` is None for a
+    policy without exploitation. `expected` are the columns of expected counts, empty for a detector
+    without chance. `decisions_ms` are the milliseconds of every call of the policy, its process
+    included. `wall_s` is in seconds.
     """
 
     score: SceneScore
@@ -126,16 +128,18 @@ class ScenePlayer:
     def row(self, config: PlayConfig, sharers: int = 1) -> Row:
         """The row of a play.
 
-        Every parameter of `PlayConfig.row`; `version` and `digest`; `film_hash`, equal wherever the
-        same film was played, and `episode_hash`, over what was fired and detected; the fields of
-        `Tally`, those of every stratum as `KIND/STRATUM/FIELD`, `ttfds` and `sightings` of the
-        events; `emerging`, by how many events the two presences differ
-        (`care_sim.evaluation.sightings`); `tracks`, `explained` and `released`;
-        `expected/COUNT` of newcomers where the detector detects by chance
-        (`care_sim.evaluation.counts`);
-        `differing_keyframes` and `differing_cells` against the reference; `keyframes`;
-        `DECISION_MS`; `peak_rss_mb`, and `wall_s` with the share of the film's that falls to one of
-        so many plays.
+        Columns:
+
+        - every parameter of `PlayConfig.row`, `version` and `digest`
+        - `film_hash`, equal for the same film, and `episode_hash` over fired cells and detections
+        - the fields of `Tally`, those of every stratum as `KIND/STRATUM/FIELD`, `ttfds` and
+          `sightings` of the events
+        - `emerging`, the number of events by which the two presences differ
+          (`care_sim.evaluation.sightings`)
+        - `tracks`, `explained` and `released`
+        - `expected/COUNT` of newcomers, for detectors with chance (`care_sim.evaluation.counts`)
+        - `differing_keyframes` and `differing_cells` against the reference
+        - `keyframes`, `DECISION_MS`, `peak_rss_mb`, and `wall_s` with an even share of the film's
         """
         record = self._record(config)
         score = record.score
@@ -162,8 +166,7 @@ class ScenePlayer:
         }
 
     def _record(self, config: PlayConfig) -> PlayRecord:
-        # The reference may be played before its own turn, for a comparison; then it is there when
-        # its row is due.
+        # The reference may be played earlier, for a comparison, and is then kept for its row.
         if config != _reference(config):
             return play_through_film(config, self._film)
         if config not in self._references:
@@ -226,7 +229,7 @@ def _decision_columns(decisions_ms: Sequence[float]) -> Row:
 
 
 def _released(policy: Policy, belief: Belief) -> int | None:
-    """The cells released at the keyframe that was just played; None where nothing is exploited."""
+    """Return the cells released at the keyframe just played; None without exploitation."""
     if policy.demanded is None or not len(policy.demanded.exploitation):
         return None
     rig = policy.rig
@@ -235,21 +238,21 @@ def _released(policy: Policy, belief: Belief) -> int | None:
 
 
 def film_hash(film: Film) -> str:
-    """A hash over what a film shows and who is hidden at its start, measured numbers rounded
+    """Hash a film's content and its initially hidden objects, measured numbers rounded
     (`care_sim.base.digests`).
 
-    Of a return it holds the cell and the object, not the range: Bullet finds where a ray meets a
-    round body by iteration, which makes a millimetre of a last bit.
+    A return is hashed by its cell and object, not its range: Bullet intersects round bodies by
+    iteration, which turns a last bit into a millimetre.
     """
     cameras = tuple(astuple(camera) for camera in film.cameras)
     content = hashlib.sha256(
         portable_bytes(film.name, cameras, film.sensor_height_m, film.keyframe_s)
     )
-    # What a policy or the scoring can see of a shot, in a fixed order.
+    # The parts of a shot that a policy or the scoring reads, in a fixed order.
     for shot in film.shots:
         annotations = shot.annotations
         seen = shot.seen
-        # Hardware that fires cells more than once meets the same film with more in it.
+        # With hardware that fires cells more than once the same film holds more returns.
         cloud = shot.cloud.to_shots()
         content.update(portable_bytes(shot.time_s, shot.token, astuple(shot.ego)))
         content.update(
@@ -284,7 +287,7 @@ def _strata(score: SceneScore) -> Row:
 
 
 def play_hash(keyframes: Sequence[OpenLoopKeyframe]) -> str:
-    """A hash over what was fired and detected."""
+    """Hash the fired cells and the detections."""
     content = hashlib.sha256()
     for record in keyframes:
         content.update(
@@ -297,7 +300,7 @@ SceneWatcher = Callable[[OpenLoop, SceneKeyframe], None]
 
 
 class PlayedScene(NamedTuple):
-    """A play: its row, the record of every keyframe and what it found (both hold truth)."""
+    """A play: its row, the record of every keyframe and its detections (both hold truth)."""
 
     row: Row
     keyframes: list[SceneKeyframe]
@@ -314,10 +317,9 @@ def trace_scene(
     """Play a policy through the film of its scene.
 
     The row has every parameter of `PlayConfig.row`, the fields of
-    `care_sim.evaluation.recall.SceneOutcome`, `version`, `keyframes`, `wall_s` and the
-    `episode_hash` that `care_sim.study.scene_play` gives the same play. `begin` is called before
-    the first keyframe, `watchers` after each; `wrap` puts wrappers that watch around the
-    environment.
+    `care_sim.evaluation.recall.SceneOutcome`, `version`, `keyframes`, `wall_s` and the play's
+    `episode_hash`. `begin` is called before the first keyframe, `watchers` after each; `wrap` puts
+    wrappers that watch around the environment.
     """
     started = time.perf_counter()
     inner = config.make_env(film)

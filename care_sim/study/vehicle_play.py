@@ -1,6 +1,6 @@
-"""Episodes of the vehicle study (paper, Sec. 5.5): their rows, and what is noted beside them.
+"""Episodes of the vehicle study (paper, Sec. 5.5): their rows, and further notes.
 
-Truth, that is which object lies behind a box or a track, is read for the scoring alone.
+Truth (the object behind a box or a track) is read for the scoring only.
 """
 
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ from care_sim.study.mechanism_play import is_covered
 from care_sim.study.run_config import Row
 
 ASKED = ("care", "all-camera", "history")
-"""The policies of which the paper says that they are one without a camera (Sec. 5.5)."""
+"""The policies that are equal without a camera, by the paper (Sec. 5.5)."""
 VEHICLE_LISTS = ("evidence_ages_ms", "dark_entries_alike", "dark_entry_cells", "dark_entry_covered")
 VEHICLE_COUNTS = (
     "boxes",
@@ -53,7 +53,7 @@ VEHICLE_MEASURES = (
     "standing_guard_least_m",
     "standing_guard_most_m",
 )
-"""Nothing where the camera never came back, nothing was forecast, or the car never stood."""
+"""None if the camera never came back, nothing was forecast, or the car never stood."""
 
 
 def play_vehicle(batch: Sequence[EpisodeConfig]) -> list[Row | str]:
@@ -76,8 +76,8 @@ def vehicle_row(config: EpisodeConfig) -> Row:
 class VehicleWatch(gymnasium.Wrapper[Observed, Action, Observed, Action]):
     """Notes every keyframe before it is played, and leaves the episode as it is.
 
-    Beside the policy that plays it runs Algorithm 3, once as in simulation (sigma_pos 0) and once
-    as on the paper's vehicle (0.4 m), and it asks other policies what they would fire.
+    It also runs Algorithm 3, once as in simulation (sigma_pos 0) and once as on the paper's vehicle
+    (0.4 m), and computes the demands of other policies.
     """
 
     def __init__(self, env: GymEnv):
@@ -127,11 +127,11 @@ class VehicleWatch(gymnasium.Wrapper[Observed, Action, Observed, Action]):
             self._counts[name] += int(number)
 
     def _note_evidence(self, loop: OneWorld) -> None:
-        """Note the age of the pictures, and of the boxes taken before a turn those whose wedge
+        """Note the age of the pictures. Of the boxes taken before a turn, count those whose wedge
         holds the centre of their object, with and without compensation.
 
-        A box counts as turned where the car has since turned by a column or more: compensation can
-        move no other.
+        A box counts as turned if the car has since turned by at least a column: compensation does
+        not move others.
         """
         detections = loop.belief.detections
         if not len(detections):
@@ -155,8 +155,8 @@ class VehicleWatch(gymnasium.Wrapper[Observed, Action, Observed, Action]):
         self._count(turned_held=held, unturned_held=unturned)
 
     def _note_forecasts(self, loop: OneWorld) -> None:
-        """Note how far the forecasts of tracks with a velocity are off, and whose error in azimuth
-        lies within Eq. 4's margin, and within that of a full hull.
+        """Note the errors of forecasts of tracks with a velocity. Count those with an azimuth error
+        within Eq. 4's margin, and within that of a full hull.
         """
         tracks = loop.belief.tracks.take(loop.belief.tracks.hits > 1)
         if not len(tracks):
@@ -178,7 +178,7 @@ class VehicleWatch(gymnasium.Wrapper[Observed, Action, Observed, Action]):
         the margin of Eq. 4.
         """
         belief = loop.belief
-        # Whether the car stands is the truth; what the guard is told is what odometry reads.
+        # Standing is judged by truth; the guard gets the odometry's reading.
         if loop.world.ego_motion.speed == 0:
             self._guards_m.append(ForgettingRules().guard_distance(belief.ego.speed))
             self._count(standing_keyframes=1)
@@ -191,13 +191,13 @@ class VehicleWatch(gymnasium.Wrapper[Observed, Action, Observed, Action]):
         self._count(released_cells=released[0], released_cells_vehicle=released[1])
 
     def _note_blackout(self, loop: OneWorld) -> None:
-        """Note at every keyframe of a blackout whether all that are asked fire alike, and after it
-        when they first differ.
+        """Note at every keyframe of a blackout whether all compared policies fire alike, and after
+        it when they first differ.
         """
         conditions = self._inner.conditions
         entries = self._new_entries(loop)
         ended_s = conditions.blackout_start_s + conditions.blackout_s
-        # A late picture of before the blackout still counts: the camera is away once none is left.
+        # A late picture from before the blackout still counts: the camera is off once none is left.
         dark = conditions.black_at(loop.world.time) and not len(loop.belief.detections)
         lit_again = loop.world.time >= ended_s - LAST_BITS_S and self._apart_after_s is None
         if not (dark or lit_again):
@@ -217,8 +217,8 @@ class VehicleWatch(gymnasium.Wrapper[Observed, Action, Observed, Action]):
             self._lists["dark_entry_covered"].append(int(is_covered(hull, tracked)))
 
     def _new_entries(self, loop: OneWorld) -> Sequence[Cells]:
-        """The hulls of the bodies that a faultless camera shows for the first time. What is there
-        at the start is no entry.
+        """Return the hulls of the bodies that a faultless camera shows for the first time.
+        Initially visible bodies are no entries.
         """
         shown = {body for body in loop.world.labels() if loop.shows(body)}
         entries = sorted(shown - self._shown)

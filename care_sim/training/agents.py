@@ -1,4 +1,4 @@
-"""Agents that were trained: those that come with the package, and those in folders and files."""
+"""Trained agents: shipped ones, and those in folders and files."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -16,14 +16,13 @@ from care_sim.training.folder import CONFIG, WEIGHTS, read_config
 
 _PACKAGE = Path(__file__).parents[1]
 _SECONDS = re.compile(r", (\d+) s$")
-"""Of learning, at the end of what a card says of the machine."""
+"""Suffix of a card's machine with the time of learning."""
 
 
 @dataclass(frozen=True)
 class Agent:
-    """A policy that was learned: its name, the file of its weights where they are not those that
-    the policy acts with by itself, where it learned, in the first of several environments, and with
-    which parameters of it.
+    """A learned policy: its name, its file of weights (None for the policy's default), the first
+    environment of its training, and that environment's parameters.
     """
 
     policy: str
@@ -41,16 +40,15 @@ class Agent:
 
     @classmethod
     def of_card(cls, policy: str, path: Path | None, card: Card) -> "Agent":
-        """Return the agent that a card describes. Raises InvalidInput for one that names no
+        """Return the agent that a card describes. Raises InvalidInput for a card without an
         environment.
         """
         if card.scenario is None:
             raise InvalidInput(f"weights {path}: the card names no environment")
-        # A card of one budget tells its cells; of those that fit any, that of a user's own.
+        # A card of one budget holds its cells; cards that fit any budget take the user's.
         cells = card.budget / card.grid.size if card.budget is not None else _ANY_BUDGET
         budgets = [one for one in _listed(card, "budget") if is_number(one)]
-        # Of several environments, with commas or without, the first; a parameter may be of one of
-        # them alone.
+        # The first of several environments; a parameter may belong to one of them.
         env = card.scenario.partition(" ")[0].rstrip(",")
         try:
             texts = [one for one in _listed(card, "env_parameters") if _is_text(one)]
@@ -61,14 +59,12 @@ class Agent:
 
 
 _ANY_BUDGET = 0.1
-"""What is played where nothing else is said, as by `care-sim run`."""
+"""Default environment, as in `care-sim run`."""
 
 
 def find_agent(named: str) -> Agent:
-    """The agent of that name, in that file, or in that folder of `care-sim train`.
-
-    Raises InvalidInput where there is none that acts outside of its training, and for a file that
-    is damaged.
+    """Return the agent of a name, a file, or a folder of `care-sim train`. Raises InvalidInput if
+    there is none that can act outside its training, and for a damaged file.
     """
     for agent in shipped_agents():
         if named in (agent.name, agent.policy):
@@ -106,9 +102,7 @@ def _weights_in(folder: Path) -> Path:
 
 @dataclass(frozen=True)
 class ShippedAgent:
-    """An agent that comes with the package: `name` of its file, the policy that acts with it, and
-    its card.
-    """
+    """A shipped agent: `name` of its file, the policy that acts with it, and its card."""
 
     name: str
     policy: str
@@ -116,7 +110,7 @@ class ShippedAgent:
 
     @property
     def columns(self) -> dict[str, str]:
-        """Return the content of its card, as people read it; empty for an empty card."""
+        """Return the readable content of its card; empty for an empty card."""
         card, config = self.card, _config(self.card)
         seconds = _SECONDS.search(card.machine)
         seed = card.seeds.get("learner", card.seeds.get("training"))
@@ -136,7 +130,7 @@ class ShippedAgent:
 
 def shipped_agents() -> list[ShippedAgent]:
     """Return the agents that come with the package, by name."""
-    # Weights are called as the policy that acts with them, unless it says otherwise.
+    # Weights have the name of their policy, unless the policy declares another name.
     acting = {getattr(made, "weights", name): name for name, made in BUILT_IN.items()}
     files = sorted(shipped_weights("").parent.glob("*.npz"))
     return [
@@ -164,7 +158,7 @@ def _budget(card: Card) -> str:
 
 
 def _validation(result: Mapping[str, Any]) -> str:
-    """The figure that told the kept weights from others; empty where none did."""
+    """Return the validation figure that selected the weights; empty without one."""
     scored = result.get("validation")
     if isinstance(scored, dict):
         return f"return {scored['mean_return']:.2f}, {counted(scored['episodes'], 'episode')}"
@@ -173,13 +167,13 @@ def _validation(result: Mapping[str, Any]) -> str:
 
 
 def _config(card: Card) -> dict[str, Any]:
-    """The configuration of the run that a card tells of; empty where it tells none."""
+    """Return the run's configuration in a card; empty without one."""
     config = card.result.get("config")
     return config if isinstance(config, dict) else {}
 
 
 def _listed(card: Card, name: str) -> list[Any]:
-    """A list of that configuration; empty where there is none."""
+    """Return a list of the configuration; empty without one."""
     told = _config(card).get(name)
     return told if isinstance(told, list) else []
 

@@ -1,4 +1,4 @@
-"""Configuration of a training: what is trained, on what, and how long."""
+"""Configuration of a training: learner, environments, length."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -14,7 +14,7 @@ from care_sim.core.defaults import HEAVIEST, Wrapping
 from care_sim.study.rows.parameters import parameters
 
 Part = Literal["pictures", "place", "tracks", "faults"]
-"""What can be left out (`care_sim.training.networks`)."""
+"""Parts that a training can leave out (`care_sim.training.networks`)."""
 HOW_LONG = ("steps", "out", "resume", "tensorboard", "threads", "processes")
 """Fields in which a resumed run may differ from the run before."""
 
@@ -26,25 +26,29 @@ class AgentConfig:
     algorithm: ClassVar[str]
 
     env: tuple[str, ...] = ("CARE-Dense-v0",)
-    """Environment id, of an installed scenario too; or a scenario as `sweep` names it. Several need
-    --drawn; one that is named twice is drawn twice as often."""
+    """Environment id, also of an installed scenario, or a scenario's name as in `sweep`. Several
+    need --drawn; a repeated one is drawn more often.
+    """
     budget: tuple[float, ...] = (0.03,)
-    """Share of the cells that may fire per keyframe. With several values, the environments take one
-    each in turn, and the weights fit any budget; the first one is evaluated. With --drawn all
-    are."""
+    """Share of the cells that may fire per keyframe. Several values are assigned to the
+    environments in turn, and the weights fit any budget. The first value is evaluated; with --drawn
+    all are.
+    """
     env_parameters: tuple[str, ...] = ()
     """Further arguments of the environment as NAME=VALUE, for example vehicles=5
-    false_negative_rate=0.2; of one of several as CARE-NCAP-v0.test=drawn.
+    false_negative_rate=0.2. For one of several environments: CARE-NCAP-v0.test=drawn.
     """
     drawn: bool = False
-    """Draw for every episode which of the environments, which budget, which faults of the camera,
-    and whether left and right change places. The reward is then minus the chances of a first
-    detection that were missed, in every environment."""
+    """For every episode, draw the environment, the budget, the faults of the camera, and whether
+    left and right are swapped. The reward is then minus the missed chances of a first detection, in
+    every environment.
+    """
     without: tuple[Part, ...] = ()
-    """What to leave out, to see what it is worth: the pictures; the place, that is the number of
-    its own that each sector has; what the pictures tell of tracks; faults of the camera."""
+    """Parts to leave out, to measure their worth: the pictures; the place (each sector's own
+    number); tracks in the pictures; faults of the camera.
+    """
     action: Literal["SectorReserve", "SectorScores"] = "SectorReserve"
-    """What the action scores: sectors for the reserve alone, or for everything."""
+    """Scope of the action's sector scores: the reserve only, or everything."""
     azimuths: int = bounded(32, 1, MOST_COLUMNS)
     """Sectors round the car."""
     elevations: int = bounded(4, 1, MOST_ROWS)
@@ -62,15 +66,17 @@ class AgentConfig:
     environments: int = bounded(8, 1, 1024)
     """Environments, or worlds, side by side."""
     processes: bool = False
-    """Give every environment a process of its own. Without it they are the worlds of one vector
-    environment, in threads where they are many; what is learned is the same."""
+    """Run every environment in its own process. By default they are the worlds of one vector
+    environment, with threads if they are many. The learned weights are the same.
+    """
     threads: int = bounded(1, 1, 1024)
-    """Threads of PyTorch. Sums are added in another order by more of them: the last bits of the
-    weights differ, and then what is learned."""
+    """Threads of PyTorch. Another number changes the order of sums, the last bits of the weights,
+    and so the learned policy.
+    """
     learning_rate: float = bounded(1e-3, 1e-8, 1)
     """Step size of Adam."""
     discount: float = bounded(0.9, 0, 1)
-    """What a reward counts if it comes one keyframe later."""
+    """Discount of a reward per keyframe."""
     evaluate_every: int = bounded(20_000, 1, LARGEST_INTEGER)
     """Environment steps between evaluations. Each evaluation also writes a checkpoint."""
     episodes: int = bounded(20, 1, TRAINING - VALIDATION)
@@ -84,7 +90,7 @@ class AgentConfig:
     """Write a log for TensorBoard into the folder: `tensorboard --logdir FOLDER` shows it."""
 
     def __post_init__(self) -> None:
-        # One alone may be given as its name.
+        # A single one may be given by name.
         env: Any = self.env
         if isinstance(env, str):
             object.__setattr__(self, "env", (env,))
@@ -97,17 +103,17 @@ class AgentConfig:
                 f"budget needs one value to {self.environments}, the environments; got "
                 f"{self.budget}"
             )
-        # Both refuse what does not fit: now, not when training begins.
+        # Both raise errors now, not when training begins.
         _ = self.wrapping, [self.arguments(name) for name in self.env]
 
     @property
     def wrapping(self) -> Wrapping:
-        """The wrappers. Raises InvalidInput for numbers that do not fit each other."""
+        """Return the wrappers. Raises InvalidInput for numbers that do not fit each other."""
         return Wrapping(self.action, self.azimuths, self.elevations, self.columns, self.rows)
 
     def arguments(self, env: str) -> dict[str, Any]:
-        """Return the arguments of one of the environments, besides the budget: those of all, and
-        its own.
+        """Return the arguments of one of the environments, without the budget: shared ones and its
+        own.
         """
         for name, _ in parameters(self.env_parameters):
             whose, dot, _ = name.rpartition(".")
@@ -120,15 +126,17 @@ class AgentConfig:
         return given
 
     def to_json(self) -> str:
-        """As text that people can read."""
+        """Return readable JSON text."""
         plain = {"algorithm": self.algorithm} | asdict(self) | {"out": str(self.out)}
-        # One alone as its name, as it was before there could be several.
+        # A single one by name, as in earlier versions.
         plain["env"] = self.env[0] if len(self.env) == 1 else self.env
         return json.dumps(plain, indent=1) + "\n"
 
     @property
     def recipe(self) -> dict[str, Any]:
-        """Return everything that decides the weights, as plain data: all but where and how long."""
+        """Return everything that decides the weights, as plain data: all but the folder and the
+        length.
+        """
         return {
             name: value
             for name, value in json.loads(self.to_json()).items()
@@ -136,9 +144,8 @@ class AgentConfig:
         }
 
     def check_same(self, before: Mapping[str, Any]) -> None:
-        """Raise InvalidInput unless the run of that configuration can be gone on with.
-
-        The message names the first difference.
+        """Raise InvalidInput unless a run of this configuration can be resumed. The message names
+        the first difference.
         """
         for name, value in self.recipe.items():
             if before.get(name) != value:
@@ -162,7 +169,7 @@ class OnPolicy(AgentConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        # Advantages are normalised, and one alone has no deviation.
+        # Advantages are normalised, and a single one has no deviation.
         if self.rollout * self.environments < 2:
             raise InvalidInput("rollout needs two steps or more, or two environments, got one step")
 
@@ -197,8 +204,8 @@ class SacConfig(AgentConfig):
 
 
 def arguments_of(env_parameters: Sequence[str], env: str) -> dict[str, Any]:
-    """The arguments NAME=VALUE of one of several environments: those of all, over which its own,
-    ENV.NAME=VALUE, win wherever they stand. Raises InvalidInput for another form.
+    """Return the arguments NAME=VALUE of one of several environments. Its own, ENV.NAME=VALUE,
+    override shared ones in any order. Raises InvalidInput for another form.
     """
     given, own = dict[str, Any](), dict[str, Any]()
     for name, value in parameters(env_parameters):
@@ -209,12 +216,12 @@ def arguments_of(env_parameters: Sequence[str], env: str) -> dict[str, Any]:
 
 
 def check_drawn(config: AgentConfig) -> None:
-    """Raise InvalidInput for what fits drawn episodes alone, or does not fit them."""
+    """Raise InvalidInput for options that need drawn episodes, or do not fit them."""
     if not config.env or not all(isinstance(name, str) for name in config.env):
         raise InvalidInput(f"env needs one name or more, got {shown(config.env)}")
     for part in config.without:
         check_known("part to be without", part, get_args(Part))
-    # Layers of their own tell them one sector from another.
+    # These learners have their own layers, which distinguish sectors.
     if "place" in config.without and not isinstance(config, PpoConfig):
         raise InvalidInput(f"without place needs ppo: {config.algorithm} sees all sectors at once")
     if config.drawn:
@@ -228,4 +235,4 @@ def check_drawn(config: AgentConfig) -> None:
 
 
 ALGORITHMS = tuple(config.algorithm for config in (PpoConfig, RecurrentPpoConfig, SacConfig))
-"""What a run may have been trained by."""
+"""Configurations of learners."""

@@ -1,8 +1,7 @@
-"""Learning curves of training runs: read from their folders, grouped, and what each group reached.
+"""Learning curves of training runs, read from their folders and grouped.
 
-Runs of a group differ by their seed alone. What several seeds reach together, and how sure that is,
-follows Agarwal et al. 2021, "Deep reinforcement learning at the edge of the statistical precipice":
-scores are (runs, tasks).
+Runs of a group differ only by their seed. Statistics over seeds follow Agarwal et al. 2021, "Deep
+reinforcement learning at the edge of the statistical precipice". Scores are (runs, tasks).
 """
 
 import json
@@ -26,10 +25,10 @@ from care_sim.training.folder import CONFIG, CURVE, EPISODES, LEARNER, read_conf
 from care_sim.training.validation import Row
 
 NOTHING, EVERYTHING = "random", "full"
-"""The rules between which scores are measured where environments differ: 0 and 1."""
+"""Rules with scores 0 and 1, for scores across environments."""
 COLUMNS = ("recipe", "seeds", "steps", "reached", "unit", "ahead of", "time")
 RESAMPLES = 2_000
-"""Drawn for one interval."""
+"""Resamples of an interval."""
 CONFIDENCE = 0.95
 _CUT = 0.25
 """Share of the scores that is left out at either end."""
@@ -54,7 +53,7 @@ class TrainingRun:
 
     @property
     def closed_loop(self) -> bool:
-        """Whether a first detection has a distance; the return alone is measured otherwise."""
+        """Whether a first detection has a distance; otherwise only the return is measured."""
         return all(row["distance_m"] is not None for row in self.episodes)
 
     @property
@@ -66,8 +65,8 @@ class TrainingRun:
 
     @cached_property
     def tasks(self) -> list[str]:
-        """The environments that are scored each by itself; one that `NOTHING` plays as well as
-        `EVERYTHING` tells nothing, unless it is the only one.
+        """Return the environments that are scored separately. One that `NOTHING` plays as well as
+        `EVERYTHING` is left out, unless it is the only one.
         """
         names = [*dict.fromkeys(row["env"] for row in self.episodes)]
         if len(names) == 1:
@@ -77,7 +76,7 @@ class TrainingRun:
 
     @property
     def rules(self) -> list[str]:
-        """The rules that the learner is beside."""
+        """Return the rules that are compared with the learner."""
         return [*dict.fromkeys(row["policy"] for row in self.episodes if row["policy"] != LEARNER)]
 
     @property
@@ -86,10 +85,9 @@ class TrainingRun:
         return [row["steps"] for row in self.curve]
 
     def scores(self, policy: str = LEARNER, steps: int = 0) -> Floats:
-        """(tasks,) of one environment metres of the first detection, or the return; of several the
-        return between those of `NOTHING` and `EVERYTHING`, which has no unit.
-
-        Raises InvalidInput where episodes are missing.
+        """Return (tasks,) scores. For one environment: metres of the first detection, or the
+        return. For several: the return, scaled from `NOTHING` to `EVERYTHING`, without unit. Raises
+        InvalidInput if episodes are missing.
         """
         if len(self.tasks) > 1:
             low, high, reached = (
@@ -101,8 +99,8 @@ class TrainingRun:
         raise self._missing(policy, steps)
 
     def each(self, policy: str, steps: int = 0) -> Floats:
-        """(episodes,) what a policy reached in every episode, by ascending seed, in the unit of
-        `scores` of one environment; of several the return.
+        """Return (episodes,) a policy's result in every episode, by ascending seed. The unit is
+        that of `scores` for one environment; for several it is the return.
         """
         column = "distance_m" if len(self.tasks) < 2 and self.closed_loop else "return"
         rows = sorted(
@@ -138,7 +136,7 @@ class TrainingRun:
 
 
 def read_run(folder: Path) -> TrainingRun:
-    """The run in a folder. Raises InvalidInput for one without an evaluation."""
+    """Return the run in a folder. Raises InvalidInput for one without an evaluation."""
     for name in (CONFIG, CURVE, EPISODES):
         if not (folder / name).is_file():
             raise InvalidInput(f"{folder} holds no evaluated training run: no {name}")
@@ -176,7 +174,9 @@ def scores_at(runs: Sequence[TrainingRun], steps: int) -> Floats:
 
 
 def recipe_name(config: Mapping[str, Any]) -> str:
-    """The learner, its environments, whether episodes were drawn, and what was left out."""
+    """Return a recipe's name: the learner, its environments, whether episodes were drawn, and
+    omitted parts.
+    """
     named = Counter(np.atleast_1d(config["env"]).tolist())
     envs = ", ".join(f"{env} x{often}" if often > 1 else env for env, often in named.items())
     without = " ".join(config.get("without", ()))
@@ -198,21 +198,19 @@ class Aggregate(NamedTuple):
 
 
 def interquartile_mean(scores: ArrayLike) -> Aggregate:
-    """The mean of the middle half of all scores (runs, tasks), which are finite.
-
-    The interval is that of the stratified bootstrap: in every task the runs are drawn with
-    replacement, independently of the other tasks, so that no task is left out of a resample.
+    """Return the mean of the middle half of all finite scores (runs, tasks). The interval is that
+    of the stratified bootstrap. In every task the runs are drawn with replacement, independently of
+    other tasks, so that every resample has all tasks.
     """
     table: Floats = np.asarray(scores, float)
     return Aggregate(float(_middle(table.ravel())), *_ends(table, _middle))
 
 
 def performance_profile(scores: ArrayLike, levels: ArrayLike) -> list[Aggregate]:
-    """The share of the scores (runs, episodes) that lie above each of `levels`.
-
-    The interval is that of the bootstrap over whole runs: a run plays all episodes, and what it is
-    better or worse at than another shows in all of them. Drawn episode by episode, runs would
-    cancel, and the interval would vanish as episodes become more.
+    """Return the share of scores (runs, episodes) above each of `levels`. The interval is that of
+    the bootstrap over whole runs: a run plays all episodes, and differences between runs show in
+    all of them. Drawn per episode, runs would cancel, and the interval would vanish with more
+    episodes.
     """
     table: Floats = np.asarray(scores, float)
     shares = [
@@ -235,9 +233,7 @@ def _mean(scores: Floats) -> Floats:
 def _ends(
     table: Floats, statistic: Callable[[Floats], Floats]
 ) -> tuple[float, float] | tuple[None, None]:
-    """Return the ends of the interval of a statistic of all scores, which it takes along the last
-    axis.
-    """
+    """Return the ends of the interval of a statistic of all scores, taken along the last axis."""
     if len(table) < 2:
         return None, None
     interval = stats.bootstrap(
@@ -255,7 +251,7 @@ def _ends(
 
 
 def curves_table(groups: Sequence[Sequence[TrainingRun]]) -> Table:
-    """Return what every recipe reached, how soon, and in how long: a row per recipe."""
+    """Return a row per recipe: its result, and its steps and time."""
     return Table(
         "Training runs",
         COLUMNS,
@@ -290,7 +286,7 @@ def _row(runs: Sequence[TrainingRun]) -> tuple[str, ...]:
 
 
 def _ahead(run: TrainingRun, steps: Sequence[int], reached: Sequence[float]) -> str:
-    """The rules that are left behind for good, and from when on."""
+    """Return the rules that the learner finally exceeds, and the steps from which it does."""
     told = []
     for rule in run.rules:
         mark = interquartile_mean(run.scores(rule)[None]).value

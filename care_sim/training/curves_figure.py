@@ -1,5 +1,5 @@
-"""The figure of learning curves: what is reached on validation seeds against the steps trained,
-and in how many of the episodes how much.
+"""The figure of learning curves: results on validation seeds against training steps, and
+performance profiles over episodes.
 """
 
 from collections.abc import Mapping, Sequence
@@ -31,11 +31,9 @@ _LINE = 50
 
 @default_style()
 def curves_figure(groups: Sequence[Sequence[TrainingRun]]) -> Figure:
-    """A panel per recipe.
-
-    It has a line per training seed, their interquartile mean with its interval where there are
-    several, and rules as lines across. Below it is the performance profile of the last evaluation
-    that all have.
+    """Draw a panel per recipe. It has a line per training seed, their interquartile mean with its
+    interval if there are several, and rules as horizontal lines. Below is the performance profile
+    of the last evaluation that all runs share.
     """
     figure = Figure(figsize=(1.2 + 4.6 * len(groups), 7.8), layout="constrained")
     panels = figure.subplots(2, len(groups), squeeze=False)
@@ -70,7 +68,7 @@ def _draw(axes: Axes, runs: Sequence[TrainingRun]) -> None:
     _all_seeds(axes, runs, hues[learner])
     # A run is evaluated before its first step too, so the last step may be 0.
     axes.set_xlim(0, max(1, *(run.steps[-1] for run in runs)))
-    # Metres are never below 0; a score is where a learner falls behind `random`.
+    # Metres are never below 0; a score is, if a learner is worse than `random`.
     if runs[0].closed_loop and len(runs[0].tasks) == 1:
         axes.set_ylim(bottom=0)
     _describe(axes, config, len(runs))
@@ -104,7 +102,7 @@ def _all_seeds(axes: Axes, runs: Sequence[TrainingRun], colour: str) -> None:
 
 
 def _draw_profiles(axes: Axes, runs: Sequence[TrainingRun]) -> None:
-    """The share of episodes above a score, of the learner's runs and of the rules."""
+    """Draw the share of episodes above a score, for the learner's runs and for the rules."""
     learner, shared = runs[0].config["algorithm"], shared_steps(runs)
     played = {rule: runs[0].each(rule)[None] for rule in runs[0].rules}
     own = [run.each(LEARNER, shared[-1]) for run in runs] if shared else []
@@ -134,12 +132,12 @@ def _middle(scores: Floats) -> float:
 
 
 def _heights(runs: Sequence[TrainingRun]) -> dict[str, float]:
-    """Where the lines of the rules lie."""
+    """Return the heights of the rules' lines."""
     return {rule: _middle(runs[0].scores(rule)) for rule in runs[0].rules}
 
 
 def _ends(runs: Sequence[TrainingRun]) -> dict[str, tuple[float, str]]:
-    """The right ends of the learner's curve and of the lines, with their colours."""
+    """Return the right ends of the learner's curve and of the lines, with their colours."""
     last = float(np.mean([_middle(run.scores(steps=run.steps[-1])) for run in runs]))
     heights = _heights(runs) | {runs[0].config["algorithm"]: last}
     return {name: (heights[name], colour) for name, colour in colours(heights).items()}

@@ -1,5 +1,4 @@
-"""Episodes that are drawn: what each is made of, the environment that plays it, and the reward that
-all share.
+"""Drawn episodes: their draws, the environment that plays them, and their common reward.
 
 | camera | share of episodes | drawn evenly from |
 |---|---|---|
@@ -8,18 +7,16 @@ all share.
 | late | 20% | 1 to 3 keyframes |
 | blind | 15% | |
 
-False boxes are not drawn: they are those of another drive, which would have to be played first.
+False boxes are not drawn: they belong to another drive, which would have to be played first.
 
-The reward is minus the chances of a first detection that were missed. A newcomer is whom the
-episode is about: in the closed loop the first-sighting actor, of a drive everybody whom it lets the
-ego meet; in the open loop the object of a first-sighting event, for the keyframes after which the
-time to first detection is censored. At a keyframe there is a chance if the newcomer has never been
-detected and a scan of every cell would give it the returns that the proxy needs. A chance that is
-missed costs 1.
-
-So a return is minus the time to first detection (paper, Remark 1) in keyframes, less what the full
-scan needs: 0 is the full scan's, and the best. No term tells of collisions. They are rare, at most
-one in an episode, and follow what is seen late.
+The reward is minus the missed chances of a first detection. In the closed loop a newcomer is the
+first-sighting actor, or in a drive every planned meeting of the ego. In the open loop a newcomer is
+the object of a first-sighting event, until its time to first detection is censored. A keyframe has
+a chance if the newcomer has never been detected and a scan of every cell would give it the returns
+that the proxy needs. A missed chance costs 1. So a return is minus the time to first detection
+(paper, Remark 1) in keyframes, relative to the full scan. The full scan has 0, the best return. No
+term counts collisions. Collisions are rare, at most one per episode, and follow from late
+detections.
 """
 
 from collections.abc import Callable, Sequence
@@ -45,19 +42,19 @@ from care_sim.policies.learned.grid_features import EGO_INPUTS
 from care_sim.sources.street_films import street_film
 
 STREETS = 24
-"""Of every split so many are drawn. A street takes 2.5 s to film, as long as 2,500 keyframes take
-to play, and 25 MB to keep."""
+"""Streets drawn from every split. A street takes 2.5 s to film, as long as playing 2,500 keyframes,
+and 25 MB.
+"""
 _STREAM = 22
-"""Apart from the streams that an environment makes of the same seed."""
+"""Separates these draws from an environment's streams of the same seed."""
 _CAMERAS = ("without", "misses", "late", "blind")
 _SHARES = (0.40, 0.25, 0.20, 0.15)
 
 
 @dataclass(frozen=True)
 class Draw:
-    """An episode: the place of its environment among those there are, its budget, the faults of its
-    camera as arguments, whether left and right change places, and the seeds of its world and of its
-    street.
+    """A drawn episode: the index of its environment, its budget, camera faults as arguments,
+    whether left and right are swapped, and the seeds of its world and its street.
     """
 
     place: int
@@ -72,8 +69,8 @@ def drawn(seed: int, places: int, budgets: Sequence[float], faulty: bool = True)
     """Draw the episode of a seed. The same seed draws the same, and seed and street are of one
     split.
 
-    `places` is the number of environments. Without `faulty` the camera has no fault and all else
-    stays as it is. Raises InvalidInput for a seed of no split.
+    `places` is the number of environments. With `faulty=False` the camera has no fault and all
+    other draws stay. Raises InvalidInput for a seed of no split.
     """
     rng = np.random.default_rng([seed, _STREAM])
     place, number, street = (int(rng.integers(most)) for most in (places, len(budgets), STREETS))
@@ -100,12 +97,12 @@ AnyEnv = gymnasium.Env[Any, Any]
 
 
 class DrawnEnv(gymnasium.Env[Any, Any]):
-    """Every reset draws an episode (`care_sim.training.drawn`) and makes the environment for it
-    with `make`, whose spaces and errors it has.
+    """An environment that draws an episode at every reset (`care_sim.training.drawn`). `make` makes
+    the episode's environment, with the same spaces and errors.
 
     `unwrapped` and `rig` are those of the running episode; before the first one, of an episode of
-    the first environment. Raises InvalidInput at once for what is wrong with any of the
-    environments, and for LiDARs that differ.
+    the first environment. Raises InvalidInput at once for errors of any of the environments, and
+    for LiDARs that differ.
     """
 
     def __init__(
@@ -118,13 +115,14 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
         self._make = make
         self._given = places, budgets, faulty
         grids = list[Grid]()
-        # Mirrored, since not every sensor can be. The first one last: its spaces stay.
+        # Mirrored, to check that every sensor can be. The first environment comes last: its spaces
+        # stay.
         for place in reversed(range(places)):
             for budget in budgets:
                 self._env = make(Draw(place, budget, {}, True, 0, 0))
                 self._env.close()
             grids.append(self.rig.grid)
-        # What is kept is of one grid, and its card tells that of the last episode.
+        # Weights fit one grid, and their card holds that of the last episode.
         if any(grid != grids[0] for grid in grids):
             raise InvalidInput("episodes can be drawn only of environments with the same LiDAR")
         self._follow()
@@ -142,9 +140,8 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin the episode that a seed draws; without one, that of a number drawn from the last.
-
-        Raises InvalidInput for a seed of no split.
+        """Begin the episode that a seed draws. Without a seed, the next seed follows from the last
+        one. Raises InvalidInput for a seed of no split.
         """
         super().reset(seed=seed)
         own = int(self.np_random.integers(2**31 - 1)) if seed is None else int(seed)
@@ -155,7 +152,7 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
         return self._env.reset(seed=draw.seed, options=options)
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """Go on to the next keyframe."""
+        """Advance to the next keyframe."""
         return self._env.step(action)
 
     def close(self) -> None:
@@ -163,13 +160,13 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
         self._env.close()
 
     def _follow(self) -> None:
-        # Environments have cameras of their own, and what they show has other bounds; behind the
-        # wrappers of learners all spaces are the same.
+        # Environments differ in cameras and in the bounds of their boxes. Behind the wrappers of
+        # learners all spaces are the same.
         self.observation_space = self._env.observation_space
         self.action_space = self._env.action_space
 
 
-# Those of the training and those of the validation.
+# Streets of training and of validation.
 _film = lru_cache(maxsize=2 * STREETS)(street_film)
 
 
@@ -195,12 +192,10 @@ _LAST_BITS = 1e-9
 
 
 class Mirrored(gymnasium.Wrapper[GridArrays, NDArray[np.float32], Any, Any]):
-    """Shows the pictures of `GridObservation` reflected at the plane through the middle of the car,
-    and reflects the scores of sectors back. `shape` (channels, rows, columns) is that of the
-    pictures.
-
-    So it fits every environment, and a learner meets either side as often. Raises InvalidInput for
-    a LiDAR that is not the same on both sides.
+    """Mirrors the pictures of `GridObservation` at the car's middle plane, and mirrors the scores
+    of sectors back. `shape` (channels, rows, columns) is that of the pictures. It fits every
+    environment, and a learner then meets both sides equally often. Raises InvalidInput for a LiDAR
+    that is not symmetric.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], shape: tuple[int, int, int]):
@@ -222,7 +217,7 @@ class Mirrored(gymnasium.Wrapper[GridArrays, NDArray[np.float32], Any, Any]):
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[GridArrays, Any, bool, bool, dict[str, Any]]:
-        """Go on to the next keyframe."""
+        """Advance to the next keyframe."""
         observation, reward, terminated, truncated, info = self.env.step(action[:, ::-1])
         return self._reflected(observation), reward, terminated, truncated, info
 
@@ -234,16 +229,15 @@ class Mirrored(gymnasium.Wrapper[GridArrays, NDArray[np.float32], Any, Any]):
 
 
 def _is_symmetric(rig: Rig) -> bool:
-    """Whether the grid's columns on the left are those on the right, reflected."""
+    """Return True if the grid's left columns mirror the right ones."""
     directions = rig.grid.directions.reshape(*rig.grid.shape, 3)
     reflected = directions[:, ::-1] * (1, -1, 1)
     return not rig.sensor_y_m and bool(np.abs(directions - reflected).max() < _LAST_BITS)
 
 
 class MissedChances(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Pays minus the chances that a keyframe missed, in the place of the reward.
-
-    It asks the truth, as every reward may. Observation and action stay as they are.
+    """Replaces the reward by minus the missed chances of a keyframe. Like every reward it may read
+    the truth. Observation and action stay as they are.
     """
 
     _count: "_InWorld | _InScene"
@@ -262,7 +256,7 @@ class MissedChances(gymnasium.Wrapper[Any, Any, Any, Any]):
         return begun
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Go on to the next keyframe."""
+        """Advance to the next keyframe."""
         # Before the world moves on.
         self._count.look()
         observation, _, terminated, truncated, info = self.env.step(action)
@@ -270,8 +264,8 @@ class MissedChances(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 
 class _InWorld:
-    """Counts the chances of the closed loop: `look` sees, before a keyframe, who could be detected,
-    and `missed` returns, after it, how many of them were not.
+    """Counts the chances of the closed loop. `look`, before a keyframe, stores which newcomers
+    could be detected. `missed`, after it, returns how many of them were not.
     """
 
     def __init__(self, env: ClosedLoopEnv):
@@ -297,7 +291,7 @@ class _InWorld:
 
 
 class _InScene:
-    """The same of the open loop."""
+    """Counts the chances of the open loop."""
 
     def __init__(self, env: OpenLoopEnv):
         self._env = env

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 STREETS_ID = "CARE-Street-v0"
 WORLDS_A_THREAD = 32
-"""With fewer, what a thread does once for all its worlds takes longer than what it saves."""
+"""Fewest worlds per thread: with fewer, the overhead of a thread exceeds its gain."""
 ACTIONS = {wrapper.__name__: wrapper for wrapper in (SectorReserve, SectorScores)}
 VECTOR_ACTIONS = {
     wrapper.single.__name__: wrapper for wrapper in (VectorSectorReserve, VectorSectorScores)
@@ -35,10 +35,9 @@ VECTOR_ACTIONS = {
 
 
 def plain(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any, Any]:
-    """The environment without wrappers, which the rules play.
-
-    Its budget is `budget`, or the first of the configuration, or drawn for every episode. Raises
-    InvalidInput for an unknown environment or a wrong argument.
+    """Return the environment without wrappers, which the rules play. Its budget is `budget`, or the
+    configuration's first one, or drawn for every episode. Raises InvalidInput for an unknown
+    environment or a wrong argument.
     """
     if config.drawn:
         return _drawn(config, lambda env, _: env, budget)
@@ -49,15 +48,15 @@ def plain(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any
 
 
 def wrapped(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any, Any]:
-    """As the learner acts and sees."""
+    """Return the environment as the learner acts and observes."""
     if config.drawn:
         return _drawn(config, partial(_as_drawn, config))
     return _pictured(config, plain(config, budget))
 
 
 def training(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any, Any]:
-    """The same, over episodes of training seeds, and without faults where it is to learn without.
-    Validations keep them: recipes are measured in the same episodes.
+    """Return the wrapped environment over training seeds, without camera faults if they are left
+    out. Validations keep the faults: recipes are measured in the same episodes.
     """
     if config.drawn:
         env = _drawn(config, partial(_as_drawn, config), faulty="faults" not in config.without)
@@ -76,8 +75,8 @@ def _drawn(
     budget: float | None = None,
     faulty: bool = True,
 ) -> DrawnEnv:
-    """Episodes that differ, under the reward that all share; `budget` takes the place of those that
-    are drawn, and all else of an episode stays.
+    """Return drawn episodes under their common reward. `budget` replaces drawn budgets; the rest of
+    an episode stays.
     """
 
     def make(draw: Draw) -> gymnasium.Env[Any, Any]:
@@ -98,7 +97,7 @@ def _as_drawn(
 
 
 def validation_episodes(config: AgentConfig) -> dict[int, str]:
-    """The environment of every validation seed."""
+    """Return the environment of every validation seed."""
     names = config.env
     return {
         seed: names[drawn(seed, len(names), config.budget).place]
@@ -107,13 +106,15 @@ def validation_episodes(config: AgentConfig) -> dict[int, str]:
 
 
 def side_by_side(config: AgentConfig) -> "VecEnv":
-    """The training environments as one vector, which reports episodes to the learner's log."""
+    """Return the training environments as one vector, which reports episodes to the learner's
+    log.
+    """
     from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecMonitor
 
     from care_sim.training.vec_env import GymnasiumVecEnv
 
     budgets = [*islice(cycle(config.budget), config.environments)]
-    # Worlds of one vector have one scenario, and episodes that are drawn do not.
+    # Worlds of one vector share a scenario; drawn episodes do not.
     is_vector = not config.drawn and config.env[0] in (*CLOSED_LOOP, *installed_ids())
     if is_vector and not config.processes:
         return VecMonitor(GymnasiumVecEnv(worlds(config, budgets)))
@@ -130,11 +131,11 @@ def side_by_side(config: AgentConfig) -> "VecEnv":
 
 
 def worlds(config: AgentConfig, budgets: list[float]) -> VectorGridObservation:
-    """The worlds of one vector environment, each with its budget: those that `training` makes one
-    by one.
+    """Return one vector environment of the worlds that `training` makes one by one, each with its
+    budget.
     """
     (name,) = config.env
-    # The pictures that learners see are drawn at once, and need no copies of what they show.
+    # Learners' pictures are drawn at once, and need no copies of observations.
     vector = gymnasium.make_vec(
         f"care_sim:{name}",
         len(budgets),
@@ -150,14 +151,14 @@ def worlds(config: AgentConfig, budgets: list[float]) -> VectorGridObservation:
 
 
 def _threads(count: int) -> int:
-    """Threads that pay for so many worlds, at most one for every core."""
+    """Return a useful number of threads for this many worlds, at most one per core."""
     return min(CORES, max(1, count // WORLDS_A_THREAD))
 
 
 def _arguments(config: AgentConfig, name: str, budget: float | list[float]) -> dict[str, Any]:
-    # Only the closed loop has a reward of weighted terms, and drawn episodes have another.
+    # Only the closed loop has a reward of weighted terms; drawn episodes have another one.
     weighted = not (config.drawn or name in OPEN_LOOP)
     reward: dict[str, Any] = {"reward_weights": {"gain": config.gain}} if weighted else {}
-    # No learner reads it, and evaluations read outcomes, which stay.
+    # No learner reads the information, and evaluations read outcomes, which stay.
     scoring = {"scoring_info": False}
     return {"budget": budget} | reward | scoring | config.arguments(name)

@@ -37,15 +37,14 @@ if TYPE_CHECKING:
 CONFIG, CURVE, EPISODES = "config.json", "curve.csv", "episodes.csv"
 CHECKPOINT, WEIGHTS = "checkpoint.zip", "weights.npz"
 LEARNER = "learner"
-"""Among the policies of the episodes, where others are rules."""
+"""Name of the learner among the policies of `episodes.csv`; the others are rules."""
 _LARGEST_DRAWN = 1e30
 """The largest return or distance that a figure can draw."""
 
 
 class Folder:
-    """The folder of a configuration.
-
-    Raises InvalidInput when it holds another run, none to be resumed, or a damaged file.
+    """The folder of a configuration. Raises InvalidInput if it holds another run, no run to resume,
+    or a damaged file.
     """
 
     def __init__(self, config: AgentConfig):
@@ -63,10 +62,7 @@ class Folder:
         self._episodes = read_table(self.path / EPISODES) if config.resume else []
 
     def begin(self, model: "BaseAlgorithm") -> None:
-        """Write the configuration down, and the learner as it is.
-
-        From here on the run can be resumed.
-        """
+        """Write the configuration and the learner. From here on the run can be resumed."""
         self.path.mkdir(parents=True, exist_ok=True)
         # The checkpoint first: a folder with a configuration alone could not be resumed.
         self.save(model)
@@ -84,19 +80,19 @@ class Folder:
 
     @property
     def seconds(self) -> float:
-        """How long the run has learned by the last evaluation."""
+        """Return the seconds of learning until the last evaluation."""
         return float(self._curve[-1]["seconds"]) if self._curve else 0.0
 
     def evaluated(self, model: "BaseAlgorithm") -> bool:
-        """Whether the learner has been evaluated as it is."""
+        """Return True if the current learner has been evaluated."""
         return bool(self._curve) and self._curve[-1]["steps"] >= model.num_timesteps
 
     def keep(
         self, model: "BaseAlgorithm", played: Sequence[Row], seconds: float, rig: Rig
     ) -> ValidationScore:
-        """Write an evaluation and, when it is the best yet, the weights. Returns its score."""
+        """Write an evaluation and, if it is the best so far, the weights. Returns its score."""
         score = ValidationScore.of(played)
-        # The weights first: when the curve knows an evaluation, its weights are there.
+        # The weights first: if the curve holds an evaluation, its weights exist.
         if score.mean_return > max((row["return"] for row in self._curve), default=float("-inf")):
             self._export(model, score, seconds, rig)
         steps = model.num_timesteps
@@ -131,7 +127,7 @@ class Folder:
         # The module subclasses PyTorch's and Stable-Baselines3's classes: optional extra 'rl'.
         from care_sim.training.networks import SectorPolicy
 
-        # Only this network has a twin in NumPy; the others act from their checkpoint.
+        # Only this network has a NumPy version; the others act from their checkpoint.
         if not isinstance(model.policy, SectorPolicy):
             return
         config = self.config
@@ -176,9 +172,8 @@ def rule_scores(episodes: Sequence[Row]) -> dict[str, ValidationScore]:
 
 
 def read_config(path: Path) -> dict[str, Any]:
-    """The configuration of a run.
-
-    Raises InvalidInput for a damaged file, or one of something else.
+    """Return the configuration of a run. Raises InvalidInput for a damaged file or another kind of
+    file.
     """
     try:
         config = json_content(path)
@@ -205,9 +200,8 @@ def read_config(path: Path) -> dict[str, Any]:
 
 
 def read_table(path: Path) -> list[Row]:
-    """The rows of `CURVE` or `EPISODES`, none of a file that is not there.
-
-    Raises InvalidInput for a damaged file.
+    """Return the rows of `CURVE` or `EPISODES`, none for a missing file. Raises InvalidInput for a
+    damaged file.
     """
     columns = COLUMNS[path.name]
     if not path.exists():
@@ -260,4 +254,4 @@ COLUMNS: dict[str, dict[str, Callable[[str], Any]]] = {
     CURVE: {"steps": _count, "seconds": _number, **_SCORES},
     EPISODES: {"policy": str, "steps": _count, "seed": _count, "env": str, **_SCORES},
 }
-"""The columns of both tables, and how each is read."""
+"""The columns of both tables, and the reader of each."""

@@ -1,6 +1,5 @@
-"""Hyperparameters in files: a TOML table for every environment, as RL Zoo has them.
-
-Those that come with the package lie in `recipes`, one file for each learner.
+"""Hyperparameters in files: a TOML table per environment, as in RL Zoo. Shipped files are in
+`recipes`, one per learner.
 """
 
 import tomllib
@@ -15,17 +14,17 @@ from care_sim.base.plugins import scenario_of
 from care_sim.training.config import HOW_LONG, AgentConfig
 
 DEFAULT = "default"
-"""The table of every environment that has none of its own."""
+"""The table of every environment without its own one."""
 DRAWN = "drawn"
-"""The table of episodes that are drawn, whatever their environments."""
+"""The table of drawn episodes, for any environments."""
 _NOT_OF_A_FILE = {*HOW_LONG, "env", "seed", "drawn", "without"} - {"steps"}
-"""Fields of a configuration that belong to one run and one machine, or say what is played."""
+"""Fields of a configuration that belong to one run, one machine, or the environments."""
 
 
 @dataclass(frozen=True)
 class Hyperparameters:
-    """The values of a table, and where it stands: the file, and the table's name, None where the
-    file has no table for the environment.
+    """The values of a table and its place: the file, and the table's name, None if the file has no
+    table for the environment.
     """
 
     values: Mapping[str, Any]
@@ -33,7 +32,7 @@ class Hyperparameters:
     table: str | None
 
     def told(self, config: AgentConfig) -> str:
-        """Return the values that apply, options included, in a line."""
+        """Return the effective values, options included, in a line."""
         if self.table is None:
             return f"hyperparameters: {self.path.name} has none for {' '.join(config.env)}"
         listed = ", ".join(f"{name} {getattr(config, name)}" for name in self.values)
@@ -41,29 +40,29 @@ class Hyperparameters:
 
 
 def shipped_file(algorithm: str) -> Path:
-    """The file that comes with the package."""
+    """Return the shipped file."""
     return Path(__file__).parent / "recipes" / f"{algorithm}.toml"
 
 
 def names_of(kind: type[AgentConfig]) -> list[str]:
-    """The hyperparameters that a file may hold for a learner."""
+    """Return the hyperparameters that a file may hold for a learner."""
     return [field.name for field in fields(kind) if field.name not in _NOT_OF_A_FILE]
 
 
 def read_hyperparameters(
     kind: type[AgentConfig], envs: Sequence[str], path: Path | None = None, drawn: bool = False
 ) -> Hyperparameters:
-    """Read the hyperparameters of a learner in an environment from the file at `path`, or else from
-    the one that comes with the package. Episodes that are `drawn` have the table DRAWN if there is
-    one; several environments without it have DEFAULT. The reward of drawn episodes has no term that
-    `gain` weighs, which then has no effect.
+    """Read the hyperparameters of a learner in an environment from the file at `path`, by default
+    from the shipped one. Episodes that are `drawn` use the table DRAWN if it exists; otherwise
+    several environments use DEFAULT. The reward of drawn episodes has no term for `gain`, which
+    then has no effect.
 
-    Raises InvalidInput for a file that is missing, damaged or has another form, for a name that is
-    no hyperparameter, and for a value that the learner does not take.
+    Raises InvalidInput for a file that is missing, damaged or has another form. Also raises it for
+    an unknown hyperparameter, and for a value that the learner does not take.
     """
     path = shipped_file(kind.algorithm) if path is None else path
     tables = _tables(path)
-    # An environment has one table, whether it is asked for by its id or as its scenario.
+    # An environment has one table, named by its id or by its scenario.
     asked = {scenario_of(env) for env in envs}
     named = [name for name in tables if name not in (DEFAULT, DRAWN)]
     found = [*([DRAWN] if drawn else []), *(one for one in named if asked == {scenario_of(one)})]
@@ -76,7 +75,7 @@ def read_hyperparameters(
     if drawn:
         values.pop("gain", None)
     try:
-        # In the environments, of one of which an env_parameter may be.
+        # Checked in the environments, since an env_parameter may belong to one of them.
         kind(**values, env=tuple(envs), drawn=drawn or len(envs) > 1)
     except InvalidInput as error:
         raise InvalidInput(f"{where}: {error}") from error
@@ -102,7 +101,7 @@ def _tables(path: Path) -> dict[str, dict[str, Any]]:
 
 
 def _settled(kind: type[AgentConfig], where: str, name: str, value: Any) -> Any:
-    """A value as the field holds it. What is no list is checked by the configuration."""
+    """Return a value as the field holds it. The configuration checks values that are not lists."""
     default = next(field.default for field in fields(kind) if field.name == name)
     if not isinstance(default, tuple):
         return value

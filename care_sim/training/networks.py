@@ -2,19 +2,19 @@
 
 `care_sim.policies.learned.ppo` computes the same network in NumPy.
 
-It can be trained without a part, to see what that part was worth:
+It can be trained without a part, to measure that part's worth:
 
-| without | what is taken away |
+| without | removed part |
 |---|---|
-| `pictures` | all six pictures: what is left is the car's motion, the budget and the place |
-| `place` | the number of its own that each sector has: what is seen alone decides its score |
-| `tracks` | all that forecasts tell in the pictures; the allocator goes on to fire at their hulls |
-| `faults` | faults of the camera in the training episodes; those of the validation keep them |
+| `pictures` | all six pictures: the car's motion, the budget and the place remain |
+| `place` | each sector's own number: only inputs decide its score |
+| `tracks` | forecasts in the pictures; the allocator still fires at their hulls |
+| `faults` | camera faults in the training episodes; validation episodes keep them |
 
-Pictures are taken away by a matrix before the first layer. It is multiplied into the weights that
-are kept, which therefore act in NumPy like any others. Tracks are in four pictures: `forecast` and
-`undetected` vanish, and `residual` and `explained`, which forecasts tell apart, become one. `fired`
-and `nearness` stay: they show the last scan, hulls at which the allocator fired among the rest.
+A matrix before the first layer removes pictures. It is multiplied into the stored weights, which
+therefore act in NumPy like any others. Tracks are in four pictures. `forecast` and `undetected`
+vanish, and `residual` and `explained`, which differ by forecasts, become one. `fired` and
+`nearness` stay: they show the last scan, including hulls at which the allocator fired.
 """
 
 from collections.abc import Collection
@@ -34,8 +34,8 @@ from care_sim.policies.learned.ppo import BLOCK_MARGIN
 
 
 def mixing(without: Collection[str]) -> NDArray[np.float32]:
-    """(channels, channels) of what is seen, from what the pictures show; the unit matrix where none
-    is taken away.
+    """Return (channels, channels) the matrix from pictures to inputs; the unit matrix if no picture
+    is left out.
     """
     matrix = np.eye(len(CHANNELS), dtype=np.float32)
     if "tracks" in without:
@@ -48,11 +48,11 @@ def mixing(without: Collection[str]) -> NDArray[np.float32]:
 
 
 class Window(nn.Module):
-    """(n, hidden, sectors) from what each sector sees: its blocks, one more on each side, and the
-    car's motion. `care_sim.policies.learned.ppo` computes the same in NumPy.
+    """Layer from each sector's inputs (its blocks, one more on each side, and the car's motion) to
+    (n, hidden, sectors). `care_sim.policies.learned.ppo` computes the same in NumPy.
 
-    `shape` is (channels, rows, columns) of the blocks, `sectors` (elevations, azimuths);
-    `goes_round` says whether the grid does; `without` what is left out of the pictures
+    `shape` is (channels, rows, columns) of the blocks, `sectors` (elevations, azimuths).
+    `goes_round` is True for a full turn. `without` lists the omitted parts of the pictures
     (`care_sim.training.networks`).
     """
 
@@ -69,7 +69,7 @@ class Window(nn.Module):
         super().__init__()
         self.shape = shape
         self.goes_round = goes_round
-        # Not kept in checkpoints, which hold what is learned.
+        # Not kept in checkpoints, which hold only learned numbers.
         self.register_buffer("mixing", torch.from_numpy(mixing(without)), persistent=False)
         self._mixes = bool(without)
         stride = shape[1] // sectors[0], shape[2] // sectors[1]
@@ -80,8 +80,8 @@ class Window(nn.Module):
         self.hidden = nn.Conv2d(hidden, hidden, 1)
 
     def bordered(self, grid: Tensor) -> Tensor:
-        """(n, channels, rows + 2, columns + 2) the blocks of grid (n, channels * rows * columns),
-        with one more on each side.
+        """Return (n, channels, rows + 2, columns + 2) the blocks of grid (n, channels * rows *
+        columns), with one more on each side.
         """
         channels, rows, columns = self.shape
         blocks = grid.view(-1, *self.shape)
@@ -91,7 +91,7 @@ class Window(nn.Module):
         result = blocks.new_zeros((len(blocks), channels, rows + 2 * side, columns + 2 * side))
         within = result[:, :, side:-side]
         within[..., side:-side] = blocks
-        # All round the car the columns go on over the seam; beyond the grid there is nothing.
+        # On a full turn the columns continue over the seam; beyond the grid everything is 0.
         if self.goes_round:
             within[..., :side], within[..., -side:] = blocks[..., -side:], blocks[..., :side]
         return result
@@ -124,8 +124,8 @@ class Windows(nn.Module):
         self.latent_dim_vf = 2 * hidden
 
     def forward(self, features: Tensor) -> tuple[Tensor, Tensor]:
-        """The features of the actor and those of the critic."""
-        # Both look at the same blocks, with the same border.
+        """Return the features of the actor and of the critic."""
+        # Both read the same blocks, with the same border.
         ego, blocks = self._seen(features)
         return self.actor(ego, blocks), self._valued(ego, blocks)
 
@@ -150,7 +150,7 @@ class Windows(nn.Module):
 
 
 class ScoreHead(nn.Module):
-    """(n, sectors) from -1 to 1: one weight per feature, one number per sector."""
+    """Layer to scores (n, sectors) from -1 to 1: one weight per feature, one number per sector."""
 
     def __init__(self, hidden: int, sectors: int):
         super().__init__()
@@ -164,7 +164,7 @@ class ScoreHead(nn.Module):
 
 
 class Joined(BaseFeaturesExtractor):
-    """(n, 4 + channels * rows * columns): the observation's vectors, one after the other."""
+    """Features (n, 4 + channels * rows * columns): the observation's vectors, concatenated."""
 
     def __init__(self, observation_space: spaces.Dict):
         super().__init__(
@@ -178,9 +178,8 @@ class Joined(BaseFeaturesExtractor):
 
 
 class Sectored(BaseFeaturesExtractor):
-    """(n, 4 + 4 * sectors): four features per sector and the car's motion.
-
-    For learners with layers of their own.
+    """Features (n, 4 + 4 * sectors): four per sector, and the car's motion. For learners with their
+    own layers.
     """
 
     def __init__(
@@ -230,7 +229,7 @@ class SectorPolicy(ActorCriticPolicy):
         # The head that Stable-Baselines3 made mixes sectors. The optimizer that it made holds that
         # head's parameters, so it is made anew too.
         self.action_net: Any = ScoreHead(self._hidden, int(np.prod(self._sectors)))
-        # A parameter like any other, since checkpoints of before hold it; it stays 0.
+        # A parameter, since earlier checkpoints hold it; it stays 0.
         self.action_net.place.requires_grad_("place" not in self._without)
         self.optimizer = self.optimizer_class(
             self.parameters(), lr=lr_schedule(1), **self.optimizer_kwargs

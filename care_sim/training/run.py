@@ -38,21 +38,20 @@ RULES = {
     "care-spread": None,
     "full": 1.0,
 }
-"""The rules that the learner is compared with, and their budget where it is not the learner's:
-chance, the paper's, patterns that ask no camera, the best of ours that remembers nothing, and what
-can be reached.
+"""The rules compared with the learner, and their budget if it is not the learner's. They are
+chance, the paper's policies, patterns without a camera, our best policy without a memory, and the
+full scan.
 """
 
 
 def train_agent(
     config: AgentConfig, evaluated: Callable[[float], None] = lambda _return: None
 ) -> None:
-    """Train, and keep everything in `config.out`; see `care_sim.training.folder`. `evaluated` is
-    told the mean return of every evaluation, once it is kept.
-
-    Raises InvalidInput for what does not fit, MissingExtra for a library that is not installed.
+    """Train, and store everything in `config.out` (`care_sim.training.folder`). `evaluated` is
+    called with the mean return of every stored evaluation. Raises InvalidInput for arguments that
+    do not fit, MissingExtra for a library that is not installed.
     """
-    # What is missing is told before the folder is made.
+    # Report a missing library before the folder is made.
     algorithm(config.algorithm)
     _check_tensorboard(config)
     import_torch().set_num_threads(config.threads)
@@ -70,9 +69,8 @@ def train_agent(
 
 
 def algorithm(name: str) -> Any:
-    """The class of a learner, a `BaseAlgorithm`.
-
-    Raises MissingExtra for one that is not installed.
+    """Return the class of a learner, a `BaseAlgorithm`. Raises MissingExtra for one that is not
+    installed.
     """
     try:
         if name == "recurrent-ppo":
@@ -86,7 +84,7 @@ def algorithm(name: str) -> Any:
 
 
 def make_learner(config: AgentConfig, envs: Any, goes_round: bool = True) -> "BaseAlgorithm":
-    """A learner that has learned nothing yet; `goes_round` says whether the grid does."""
+    """Return a new learner; `goes_round` is True for a full turn."""
     policy, options = _settings(config, goes_round)
     log = str(config.out / TENSORBOARD) if config.tensorboard else None
     learner: BaseAlgorithm = algorithm(config.algorithm)(
@@ -103,7 +101,7 @@ def make_learner(config: AgentConfig, envs: Any, goes_round: bool = True) -> "Ba
 
 
 def _settings(config: AgentConfig, goes_round: bool) -> tuple[Any, dict[str, Any]]:
-    """The policy, and the options that are the learner's own."""
+    """Return the policy, and the learner's own options."""
     # The module subclasses PyTorch's and Stable-Baselines3's classes: optional extra 'rl'.
     from care_sim.training.networks import Sectored, SectorPolicy
 
@@ -151,17 +149,17 @@ def _resumed(config: AgentConfig, folder: Folder, envs: Any) -> "BaseAlgorithm":
             f"{folder.path}: {model.num_timesteps} steps are done; ask for more than that with "
             "--steps"
         )
-    # Episodes other than those before the interruption; the same again at every resumption.
+    # Other episodes than before the interruption; the same at every resumption.
     envs.seed(config.seed + model.num_timesteps)
-    # The experience of SAC is not kept, so it gathers some anew before it learns from it.
+    # SAC's experience is not stored, so SAC gathers some before it learns.
     if config.algorithm == "sac":
         model.learning_starts += model.num_timesteps  # type: ignore[attr-defined]
     return model
 
 
 def played_rules(config: AgentConfig) -> dict[str, list[Row]]:
-    """How the rules play the validation seeds. One that does not fit the learner's environment, as
-    a map of another grid, is left out, and said so.
+    """Play the validation seeds with the rules. A rule that does not fit the learner's environment,
+    such as a map of another grid, is reported and left out.
     """
     print_lines(f"playing the rules on {counted(config.episodes, 'validation episode')}")
     played = {}
@@ -183,10 +181,9 @@ def _learn(
     env: Any,
     evaluated: Callable[[float], None],
 ) -> None:
-    """Evaluate and learn in turn, until the last step is evaluated.
-
-    Stable-Baselines3's EvalCallback and CheckpointCallback cannot do it: the one evaluates episodes
-    of seeds that it draws itself, the other does not replace its files whole.
+    """Evaluate and learn in turn, until the last step is evaluated. Stable-Baselines3's callbacks
+    do not fit: EvalCallback draws its own seeds, and CheckpointCallback does not replace its files
+    whole.
     """
     before, begun, learning_s = folder.seconds, model.num_timesteps, 0.0
     with shown_progress(config.steps, "steps") as show:
@@ -221,7 +218,7 @@ def _learn_steps(
         shown(local["self"])
         return True
 
-    # An interrupt ends `learn` anywhere; what was learned until then is kept.
+    # An interrupt ends `learn` anywhere; the weights learned until then are kept.
     try:
         model.learn(steps, ConvertCallback(each), reset_num_timesteps=False)
     finally:
@@ -229,7 +226,7 @@ def _learn_steps(
 
 
 def _paced(show: Show, config: AgentConfig) -> Callable[["BaseAlgorithm"], None]:
-    """Shows the steps per second since the first ones that it is told of, and what is left."""
+    """Return a display of steps per second and remaining time."""
     first: tuple[int, float] | None = None
 
     def shown(model: "BaseAlgorithm") -> None:

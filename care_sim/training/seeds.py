@@ -1,4 +1,4 @@
-"""Episodes of training and of validation seeds alone (`care_sim.base.seeds`)."""
+"""Episodes with only training or only validation seeds (`care_sim.base.seeds`)."""
 
 from typing import Any
 
@@ -36,9 +36,8 @@ class TrainingSeeds(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 class VectorTrainingSeeds(WorldsWrapper):
     """`TrainingSeeds` over a vector environment in the mode "Disabled". It begins the episodes
-    itself, and so is in the mode "SameStep".
-
-    Raises InvalidInput for another mode, and for a mask of worlds that are to be reset.
+    itself, so its own mode is "SameStep". Raises InvalidInput for another mode, and for a reset
+    mask.
     """
 
     single = TrainingSeeds
@@ -93,8 +92,8 @@ _Infos = dict[str, Any]
 
 
 def _same_step(infos: _Infos, begun: _Infos, last: NDArray[np.object_], over: Mask) -> _Infos:
-    """What a step tells whose `infos` are of all worlds, if in those that are `over`, with the
-    `last` observations (W,), episodes begin that tell `begun`.
+    """Return a step's infos if worlds that are `over` begin new episodes. `infos` are of all
+    worlds, `last` (W,) the final observations, `begun` the infos of the new episodes.
     """
     finals = {
         "final_obs": last,
@@ -106,7 +105,7 @@ def _same_step(infos: _Infos, begun: _Infos, last: NDArray[np.object_], over: Ma
 
 
 def _part(infos: _Infos, who: Mask) -> _Infos:
-    """What infos tell of the worlds `who` (W,), in the form of Gymnasium."""
+    """Return the infos of the worlds in `who` (W,), in the form of Gymnasium."""
     part = _Infos()
     for name, column in _columns(infos):
         told = infos[f"_{name}"] & who
@@ -119,7 +118,7 @@ def _part(infos: _Infos, who: Mask) -> _Infos:
 
 
 def _joined(infos: _Infos, others: _Infos) -> _Infos:
-    """What both tell, the `others` of other worlds."""
+    """Merge infos; the `others` belong to other worlds."""
     joined = infos | {name: value for name, value in others.items() if name not in infos}
     for name, column in _columns(others):
         if name not in infos:
@@ -146,14 +145,14 @@ class _Sequence:
         self._rng = np.random.default_rng()
 
     def next(self, seed: int | None = None) -> int:
-        """The next one; with a `seed` the first of another sequence."""
+        """Return the next seed; with a `seed`, the first of another sequence."""
         if seed is not None:
             self._rng = np.random.default_rng((seed, self._learner))
         return int(self._rng.integers(TRAINING, LAST))
 
 
 def validation_seeds(episodes: int) -> range:
-    """The first `episodes` seeds of the validation. Raises InvalidInput for more than there are."""
+    """Return the first `episodes` validation seeds. Raises InvalidInput for more than there are."""
     if episodes > TRAINING - VALIDATION:
         raise InvalidInput(
             f"episodes must be at most {TRAINING - VALIDATION}, the validation seeds, got "

@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
 
 Row = dict[str, Any]
-"""How an episode was played: `seed`, `env`, `return`, and `distance_m`, the metres at which the
-first-sighting actor was detected, 0 where it never was; None in the open loop.
+"""The result of an episode: `seed`, `env`, `return`, and `distance_m`, the metres at which the
+first-sighting actor was detected. The distance is 0 without a detection, None in the open loop.
 """
 Choose = Callable[[Any, bool], NDArray[np.float32]]
-"""The action for an observation. The flag tells that the episode begins with it."""
+"""Returns the action for an observation. The flag is True at the beginning of an episode."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class ValidationScore:
 
     @classmethod
     def of(cls, played: Sequence[Row]) -> "ValidationScore":
-        """The means of one episode or more."""
+        """Return the means of one or more episodes."""
         metres = [row["distance_m"] for row in played]
         mean_m = None if None in metres else float(np.mean(metres))
         return cls(len(played), float(np.mean([row["return"] for row in played])), mean_m)
@@ -53,7 +53,7 @@ def play(env: gymnasium.Env[Any, Any], choose: Choose, episodes: Mapping[int, st
 
 
 def acting(learner: "BaseAlgorithm") -> Choose:
-    """The learner's choice, with its memory from keyframe to keyframe."""
+    """Return the learner's choice of actions, with its memory between keyframes."""
     memory = None
 
     def choose(observation: Any, begins: bool) -> NDArray[np.float32]:
@@ -68,8 +68,8 @@ def acting(learner: "BaseAlgorithm") -> Choose:
 
 
 def rule(name: str, env: gymnasium.Env[Any, Any]) -> Choose:
-    """The choice of a policy by name, made anew for every episode: where episodes are drawn, each
-    has a rig of its own.
+    """Return the choice of actions of a named policy. It is made anew for every episode, since
+    drawn episodes have their own rigs.
     """
     policy: care_sim.Policy
 
@@ -94,7 +94,7 @@ def _episode(env: gymnasium.Env[Any, Any], choose: Choose, seed: int, name: str)
         begins = False
         over = terminated or truncated
     outcome: dict[str, Any] = info["outcome"]
-    # An actor who is never detected counts as 0 m, the worst there is. The open loop has no such
+    # An actor that is never detected counts as 0 m, the worst value. The open loop has no such
     # distance.
     distance = outcome["detection_distance_m"] or 0.0 if "detection_distance_m" in outcome else None
     return {"seed": seed, "env": name, "return": total, "distance_m": distance}

@@ -26,12 +26,11 @@ Infos = list[dict[str, Any]]
 
 
 class GymnasiumVecEnv(VecEnv):
-    """All worlds of a vector environment, as a learner of Stable-Baselines3 takes them: what
-    `DummyVecEnv` of the single environments answers.
-
-    Learners need the mode "SameStep" of `autoreset_mode`. In infos None may read NaN, as in all of
-    Gymnasium's vectors. Attributes of a world are its own, or else those of its vector environment,
-    which has no methods for one world alone. Raises InvalidInput for another mode.
+    """All worlds of a vector environment for a learner of Stable-Baselines3. Results equal those of
+    `DummyVecEnv` over the single environments. Learners need the mode "SameStep" of
+    `autoreset_mode`. In infos None may read NaN, as in all of Gymnasium's vectors. Attributes of a
+    world are its own, or else those of its vector environment. Methods of single worlds are not
+    available. Raises InvalidInput for another mode.
     """
 
     def __init__(self, env: AnyVector):
@@ -61,7 +60,7 @@ class GymnasiumVecEnv(VecEnv):
         self._actions = actions
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Observations, rewards (W,) float32, whether episodes are over (W,), and infos."""
+        """Return observations, rewards (W,) float32, whether episodes are over (W,), and infos."""
         if self._actions is None:
             raise gymnasium.error.ResetNeeded("call step_async() before step_wait()")
         actions, self._actions = self._actions, None
@@ -77,8 +76,8 @@ class GymnasiumVecEnv(VecEnv):
         self.env.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """An attribute of every world: that of the outermost wrapper which has it, or else its own.
-        Raises AttributeError for another.
+        """Return an attribute of every world: that of the outermost wrapper with the attribute, or
+        its own. Raises AttributeError without one.
         """
         each = self._attributes(attr_name)
         return [each[world] for world in self._get_indices(indices)]
@@ -103,8 +102,8 @@ class GymnasiumVecEnv(VecEnv):
         wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]],
         indices: VecEnvIndices = None,
     ) -> list[bool]:
-        """Whether the vector environment stands in a wrapper of that class, or in the one that is
-        its like for vectors.
+        """Return True if the vector environment has a wrapper of that class, or of its vector
+        version.
         """
         kinds = [
             kind for one in self._wrappers() for kind in (type(one), getattr(one, "single", None))
@@ -128,7 +127,9 @@ class GymnasiumVecEnv(VecEnv):
             return [getattr(self.env.unwrapped, name)] * self.num_envs
 
     def _kept(self, observation: Any) -> Any:
-        """The observation, which the next step leaves as it is: learners read it after it."""
+        """Return the observation in a form that the next step does not overwrite: learners read it
+        later.
+        """
         if getattr(self.env.unwrapped, "copy", True):
             return observation
         if isinstance(self.observation_space, spaces.Dict):
@@ -149,19 +150,19 @@ class GymnasiumVecEnv(VecEnv):
 
 
 def info_of_each(infos: Mapping[str, Any], worlds: int) -> Infos:
-    """The info of each of so many worlds, from that of a vector environment; see
+    """Split the info of a vector environment into one per world; see
     `gymnasium.vector.VectorEnv`.
     """
     each: Infos = [{} for _ in range(worlds)]
     for name, column in infos.items():
         who = infos.get(f"_{name}")
-        # Last observations and infos are not what a world tells of its step.
+        # Final observations and infos are not part of a world's own info.
         if who is None or name in ("final_obs", "final_info"):
             continue
         if isinstance(column, dict):
             rows: list[Any] = info_of_each(column, worlds)
         else:
-            # Numbers become those of Python, which the single environments tell.
+            # Numbers become Python's own, as in the single environments.
             rows = column.tolist() if column.ndim == 1 else [*column]
         for world in np.flatnonzero(who).tolist():
             each[world][name] = rows[world]

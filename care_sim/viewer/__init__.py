@@ -1,3 +1,1 @@
-"""Recordings of episodes that the Rerun viewer plays; the one package that imports Rerun, and only
-while it records.
-"""
+"""Recordings for the Rerun viewer. Only this package imports Rerun, and only while it records."""

@@ -17,18 +17,18 @@ NO_RETURN_COLOUR = (112, 116, 124)
 EXPLAINED_COLOUR = (90, 220, 255)
 UNEXPLAINED_COLOUR = (255, 170, 40)
 FALSE_COLOUR = (255, 105, 180)
-"""Of the camera's boxes: a forecast explains them, none does, they show nothing."""
+"""Colours of camera boxes: explained by a forecast, unexplained, false."""
 MISSED_COLOUR = (255, 80, 120)
-"""Of what a camera without its faults would have given besides."""
+"""Colour of boxes that only a faultless camera would have reported."""
 COASTING_COLOUR = (120, 140, 190)
-"""Of a track that the last scan missed, whose box is its forecast."""
+"""Colour of a track that the last scan missed; its box is a forecast."""
 BRAKING_COLOUR = (255, 80, 70)
 EGO_COLOUR = (200, 204, 212)
 
 FOUND_COLOUR = (80, 230, 110)
 NOT_FOUND_COLOUR = (255, 120, 60)
 UNSCORED_COLOUR = (95, 100, 108)
-"""Of annotated objects, the last of those beyond the range that is scored."""
+"""Colours of annotated objects, the last for those beyond the scored range."""
 
 SHARE_COLOURS = np.array(
     [
@@ -41,7 +41,7 @@ SHARE_COLOURS = np.array(
     ],
     np.uint8,
 )
-"""Of cells and their returns, by place in `care_sim.core.firing.actions.SHARES`."""
+"""Colours of cells and their returns, by place in `care_sim.core.firing.actions.SHARES`."""
 
 
 def found_colour(keyframe: SceneKeyframe, row: int) -> Colour:
@@ -59,7 +59,7 @@ def box_colour(known: bool, false: bool) -> Colour:
 
 
 class State(NamedTuple):
-    """How it stands with somebody: words and their colour."""
+    """The state of an actor: words and their colour."""
 
     words: str
     colour: Colour

@@ -1,4 +1,4 @@
-"""How close the ego came to others, and how it hit them."""
+"""The ego's closest approach and its impacts."""
 
 import math
 from dataclasses import dataclass
@@ -10,18 +10,16 @@ from care_sim.core.cells.boxes import half_extents
 from care_sim.core.frames import Frame, Pose
 
 INTO_FRONT_M = 0.5
-"""What the ego runs into may be this far behind its bumper when it is noticed: what it drives in a
-world step at 36 km/h.
+"""Depth behind the bumper at which a body still counts as ahead, metres: the way of a world step at
+36 km/h.
 """
 
 
 @dataclass(frozen=True)
 class Impact:
-    """The ego's first contact with a `body` of some `kind`, at the ego's own speed `speed_mps`.
-
-    `at_front` says whether that body lay ahead of the ego: the ego ran into it. Else it ran into
-    the ego, from the side or from behind. `closing_mps` is the magnitude of the difference of the
-    two velocities.
+    """The ego's first contact with a `body` of some `kind`, at the ego's own speed `speed_mps`. If
+    `at_front`, the body lay ahead and the ego ran into it. Otherwise the body ran into the ego,
+    from the side or from behind. `closing_mps` is the magnitude of the velocity difference.
     """
 
     body: int
@@ -34,8 +32,8 @@ class Impact:
     def on(
         cls, body: int, kind: str, boxes: Floats, ego: int, speed_mps: float, velocity: Floats
     ) -> "Impact":
-        """That of the body `ego` on another one, which moves at `velocity` (2,); `boxes` (m, 7) are
-        those of all bodies by id.
+        """Return the impact of the body `ego` on another body, which moves at `velocity` (2,).
+        `boxes` (m, 7) are those of all bodies by id.
         """
         own = boxes[ego]
         x, y, heading = own[[0, 1, 6]].tolist()
@@ -61,13 +59,13 @@ class ClosestApproach:
 
     @property
     def impact_speed_mps(self) -> float | None:
-        """The ego's speed at that contact, None without one."""
+        """The ego's speed at the impact, None without one."""
         return self.impact.speed_mps if self.impact else None
 
 
 def lies_ahead(box: Floats, ego: Pose, length: float) -> bool:
-    """Whether a box (7,) of the world lies wholly ahead of the front of a car of this length at the
-    pose `ego`, less `INTO_FRONT_M`.
+    """Return True if a box (7,) lies wholly ahead of a car's front, less `INTO_FRONT_M`. The car is
+    at the pose `ego` and has this length; all is in the world frame.
     """
     local = Frame.mounted(ego, (0.0, 0.0, 0.0)).boxes_to_local(np.asarray(box)[None])
     (half_x,), _ = half_extents(local)

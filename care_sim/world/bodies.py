@@ -1,4 +1,4 @@
-"""The catalogue of bodies: what each looks like, how large it is, and where the size comes from.
+"""The catalogue of bodies: shapes, sizes, and the sources of sizes.
 
 Body frame: x forward, y left, z up, origin on the ground under the centre. Sizes are length, width,
 height in metres. Unless a line says otherwise they are the mean annotated sizes of nuScenes, as in
@@ -24,8 +24,8 @@ REFLECTANCES = {
     # and light vehicles: no one figure holds for paint.
     DARK_PAINT: 0.10,
     LIGHT_PAINT: 0.80,
-    # What a surface of glass reflects at right angles (Fresnel, index 1.5). It goes one way, so a
-    # LiDAR gets this much at the most.
+    # Reflection of glass at right angles (Fresnel, index 1.5). It goes one way, so a LiDAR gets at
+    # most this much.
     GLASS: 0.04,
     # The middle of the 40 to 60% that targets of pedestrians must have at 850 to 910 nm (ISO
     # 19206-2; ACEA, articulated pedestrian target).
@@ -39,9 +39,9 @@ REFLECTANCES = {
     CONCRETE: 0.24,
     ASPHALT: 0.17,
 }
-"""The share of a near-infrared pulse that a surface of each material scatters, 0 to 1, as if it did
-so alike in all directions (Lambert); what shines like a mirror, as paint and glass also do, is left
-out. The LiDARs of cars send at 850 to 905 nm.
+"""Share of a near-infrared pulse that a surface of each material scatters, 0 to 1, as if in all
+directions alike (Lambert). Mirror-like reflection, which paint and glass also have, is left out.
+Car LiDARs send at 850 to 905 nm.
 """
 
 
@@ -86,7 +86,7 @@ def _box(
     colour: Triple,
     material: str = DARK_PAINT,
 ) -> Part:
-    """A box from where to where it reaches along each axis of the body."""
+    """Return a box by its ends along each axis of the body."""
     size = (x[1] - x[0], y[1] - y[0], z[1] - z[0])
     centre = ((x[1] + x[0]) / 2, (y[1] + y[0]) / 2, (z[1] + z[0]) / 2)
     return Part("box", size, centre, colour, material)
@@ -101,8 +101,8 @@ def _two_box(
     colour: Triple,
     paint: str = DARK_PAINT,
 ) -> BodyKind:
-    """A passenger vehicle: full-length body up to `waist`, and a cabin of glass above it. `cabin`
-    says from where to where it reaches, as shares of the length from the rear.
+    """Return a passenger vehicle: full-length body up to `waist`, and a cabin of glass above it.
+    `cabin` holds the cabin's ends, as shares of the length from the rear.
     """
     length, width, height = size
     half, side = length / 2, width / 2
@@ -258,10 +258,8 @@ CATALOGUE = {
 
 
 def sized(name: str, label: str | None, size: Triple) -> BodyKind:
-    """A body of any size: the parts of the catalogue's kind for `label`, scaled to it, and a block
-    without label.
-
-    Round parts stay round and within the box.
+    """Return a body of any size. The parts of the catalogue's kind for `label` are scaled to it;
+    without a label the body is a block. Round parts stay round and within the box.
     """
     if label is None:
         return _block(name, None, size, (0.5, 0.5, 0.5))

@@ -1,7 +1,6 @@
-"""The bodies of a world as tables, a row per body: their boxes, the parts that rays can hit, and
-the polyhedra that cameras see.
-
-Who asks about many bodies at once, such as a compiled engine, reads these instead of PyBullet.
+"""The bodies of a world as tables, a row per body: boxes, parts that rays can hit, polyhedra that
+cameras see. Code that reads many bodies at once, such as a compiled engine, uses these instead of
+PyBullet.
 """
 
 import math
@@ -33,7 +32,7 @@ class Footprints:
         self.boxes = np.empty((0, 7))
 
     def add(self, body: int, size: Triple, pose: Pose) -> None:
-        """Take in a body of a size on the ground plane."""
+        """Add a body of a size on the ground plane."""
         # Ids count upwards, the ground's among them: rows between stay NaN.
         self.boxes = _with_room(self.boxes, body, np.nan)
         x, y, heading = pose
@@ -44,8 +43,9 @@ class Footprints:
         return bool(_move(self.boxes, bodies, poses))
 
     def near(self, body: int, within: float) -> Integers:
-        """Ids of the other bodies that may be within `within` metres of one. None of those is
-        missing; some may be further away, since rectangles along x and y stand for the footprints.
+        """Return the ids of other bodies that may be within `within` metres of a body. The list is
+        complete. Some bodies may be farther away, since rectangles along x and y approximate the
+        footprints.
         """
         return bodies_near(self.boxes, body, within)
 
@@ -118,15 +118,15 @@ class Primitives:
         self._tables: Solids | None = None
 
     def add(self, body: int, parts: tuple[Part, ...]) -> None:
-        """Take in a body, its parts in its own frame; a body that nothing can hit has none."""
+        """Add a body by its parts in its own frame; a body that nothing can hit has none."""
         self.poses = _with_room(self.poses, body, 0.0)
         self._bodies.append((body, parts))
         self._tables = None
 
     @property
     def tables(self) -> Solids:
-        """All k parts, those of a body side by side: (k,) places in SHAPES, (k, 3) half extents and
-        (k, 3) centres in the body frame, metres, and (k,) body ids.
+        """Return all k parts, body by body: (k,) places in SHAPES, (k, 3) half extents and (k, 3)
+        centres in the body frame, metres, and (k,) body ids.
         """
         if self._tables is None:
             self._tables = _joined(tuple(self._bodies))
@@ -140,15 +140,15 @@ class Primitives:
 
 @lru_cache(maxsize=16)
 def _joined(bodies: tuple[OwnParts, ...]) -> Solids:
-    """See `Primitives.tables`. Many an episode has the bodies of the one before, elsewhere."""
-    # That of no parts first: then there is always one to join.
+    """See `Primitives.tables`. Cached, since many episodes have the bodies of the previous one."""
+    # Begin with a table without parts: then there is always one to join.
     columns = zip(*map(_columns, [(), *(parts for _, parts in bodies)]), strict=True)
     shapes, halves, offsets = map(np.concatenate, columns)
     return shapes, halves, offsets, owners_of(bodies)
 
 
 def owners_of(bodies: Sequence[OwnParts]) -> Integers:
-    """(k,) the body ids of all parts, those of a body side by side."""
+    """Return (k,) the body ids of all parts, body by body."""
     return np.repeat(
         np.array([body for body, _ in bodies], np.int64), [len(parts) for _, parts in bodies]
     )
@@ -194,17 +194,18 @@ class Polyhedra:
         self._tables: Tables | None = None
 
     def add(self, body: int, parts: tuple[Part, ...]) -> None:
-        """Take in what is seen of a body, its parts in its own frame."""
+        """Add the visible parts of a body, in its own frame."""
         self._bodies.append((body, parts))
         self._tables = None
 
     @property
     def tables(self) -> Tables:
-        """All k parts in one: corners (c, 3) in metres; faces (f, 4), outward unit normals and
-        distances from the body's origin in metres; edges (e, 2), the two faces that meet in each,
-        counted within the part. Then (k + 1, 3) where the rows of each part begin in these three,
-        (k,) the body ids, and (k,) the distance of each part's farthest corner from the body's
-        origin in metres.
+        """Return all k parts in one. Corners (c, 3) are in metres. Faces (f, 4) are outward unit
+        normals and distances from the body's origin in metres. Edges (e, 2) are the two faces that
+        meet in each edge, counted within the part.
+
+        Then come (k + 1, 3) the first rows of each part in these three, and (k,) the body ids.
+        Last, (k,) the distance of each part's farthest corner from the body's origin in metres.
         """
         if self._tables is None:
             self._tables = _joined_meshes(tuple(self._bodies))
@@ -213,7 +214,7 @@ class Polyhedra:
 
 @lru_cache(maxsize=16)
 def _joined_meshes(bodies: tuple[OwnParts, ...]) -> Tables:
-    """See `Polyhedra.tables`. Many an episode has the bodies of the one before, elsewhere."""
+    """See `Polyhedra.tables`. Cached, since many episodes have the bodies of the previous one."""
     # A body without parts first: then there is always one to join.
     columns = zip(*map(_body, [(), *(parts for _, parts in bodies)]), strict=True)
     corners, faces, edges, sizes, reaches = map(np.concatenate, columns)
@@ -224,8 +225,8 @@ def _joined_meshes(bodies: tuple[OwnParts, ...]) -> Tables:
 
 @lru_cache(maxsize=1024)
 def _body(parts: tuple[Part, ...]) -> tuple[Floats, Floats, Integers, Integers, Floats]:
-    """Corners, faces and edges of a body's k parts, one after the other; (k, 3) how many there are
-    of each in every part, and (k,) their reaches, as in `Polyhedra.tables`.
+    """Return corners, faces and edges of a body's k parts, concatenated. Also returns (k, 3) their
+    numbers per part, and (k,) reaches as in `Polyhedra.tables`.
     """
     meshes = [_mesh(part) for part in parts]
     corners, faces, edges = map(np.concatenate, zip(_NOTHING, *meshes, strict=True))
@@ -281,8 +282,8 @@ def _corners(shape: str, size: Floats) -> Floats:
 
 @cache
 def directions() -> Floats:
-    """(42, 3) the unit vectors in which Bullet's `btShapeHull` looks for the surface of a round
-    shape: the corners of an icosahedron that stands on one of them, and the middles of its edges.
+    """Return (42, 3) the unit vectors along which Bullet's `btShapeHull` samples a round shape.
+    They are the corners of an icosahedron that stands on one of them, and the middles of its edges.
     """
     azimuths = np.deg2rad(np.arange(0, 360, 72))
     rings = [_ring(azimuths + np.deg2rad(36), -1.0), _ring(azimuths, 1.0)]

@@ -1,4 +1,4 @@
-"""The one owner of a PyBullet client: bodies, poses, rays, pictures of ids and colours, clearance.
+"""The only owner of a PyBullet client: bodies, poses, rays, pictures of ids and colours, clearance.
 
 World frame: x along the road, y left, z up; metres and radians.
 """
@@ -32,20 +32,18 @@ PixelWindow = tuple[int, int, int, int]
 RAYS_PER_CALL = 8192
 """`rayTestBatch` returns nothing, silently, for a batch of 16,384 rays or more."""
 FAR_M = 120.0
-"""Nothing further from the image plane is seen."""
+"""Depth of view: cameras see nothing farther from the image plane."""
 
 
 class BulletWorld:
-    """Bodies in one DIRECT client, over a ground plane at z = 0 unless `ground` is False.
+    """Bodies in one DIRECT client, over a ground plane at z = 0 unless `ground` is False. Do not
+    share it between processes. An unclosed world gives its client back with its last reference.
 
-    It is not to be shared between processes. Where it is not closed, its client is given back with
-    the last reference.
+    The ground, transparent bodies and backdrops are not drawn. No camera needs their ids, and
+    rendering them costs more than the rest of the picture.
 
-    The ground, transparent bodies and backdrops are not drawn: no camera needs their ids, and
-    rendering them costs more than everything else in the picture.
-
-    `primitives` and `polyhedra` know every body and pose at once. PyBullet learns of a body, and of
-    its pose, when it is asked about it, and a client is borrowed when PyBullet is first asked.
+    `primitives` and `polyhedra` hold every body and pose at once. PyBullet gets a body and its pose
+    when they are first needed. A client is borrowed when PyBullet is first needed.
     """
 
     def __init__(self, ground: bool = True) -> None:
@@ -67,10 +65,9 @@ class BulletWorld:
         transparent: bool = False,
         backdrop: bool = False,
     ) -> int:
-        """Place a body and return its id. A `transparent` one is neither hit by rays nor seen.
-
-        A `backdrop` stands behind all that perception reports: rays hit it, cameras need not render
-        it.
+        """Place a body and return its id. Rays and cameras ignore a `transparent` body. A
+        `backdrop` stands behind everything that perception reports: rays hit it, cameras need not
+        render it.
         """
         seen = () if transparent or backdrop else kind.parts
         body = self._bodies.add(kind.parts, seen, TRANSPARENT if transparent else OPAQUE)
@@ -80,7 +77,7 @@ class BulletWorld:
         return body
 
     def move(self, body: int, pose: Pose | Frame) -> None:
-        """Put a body at a pose on the ground plane, or at a frame: anywhere, turned in any way."""
+        """Move a body to a pose on the ground plane, or to any frame."""
         self.primitives.poses[body] = _standing(pose)
         self._bodies.moved([body])
 
@@ -93,7 +90,7 @@ class BulletWorld:
 
     @contextmanager
     def placed(self, poses: Floats) -> Iterator[None]:
-        """While it lasts, the bodies at `poses` (m, 7) in the place of `primitives.poses`."""
+        """Place the bodies at `poses` (m, 7) within the block, instead of `primitives.poses`."""
         own = self.primitives.poses
         changed = np.flatnonzero((poses != own).any(axis=1)).tolist()
         self.primitives.poses = poses
@@ -111,7 +108,7 @@ class BulletWorld:
         there.
         """
         # Bullet tests stretches, from a source to a target, and answers with the share of the way.
-        self._bodies.tell_all(self.primitives.poses)
+        self._bodies.sync_all(self.primitives.poses)
         targets = origin + directions * reach
         hits: list[tuple[Any, ...]] = []
         for start in range(0, len(targets), RAYS_PER_CALL):
@@ -120,7 +117,7 @@ class BulletWorld:
             hits += pybullet.rayTestBatch(
                 sources, batch, collisionFilterMask=OPAQUE, physicsClientId=self._client.number
             )
-        # It fails by answering too little, not by an error.
+        # A failed call returns too few answers and raises no error.
         if len(hits) != len(targets):
             raise RuntimeError(f"PyBullet answered {len(hits)} of {len(targets)} rays")
         ids = np.fromiter((hit[0] for hit in hits), np.int64, len(hits))
@@ -152,11 +149,11 @@ class BulletWorld:
         """Smallest distance between two hulls, metres; negative when they overlap, inf beyond
         `within`.
         """
-        own, others = self._bodies.tell([body, other], self.primitives.poses)
+        own, others = self._bodies.sync([body, other], self.primitives.poses)
         return self._bodies.clearance(own, others, within)
 
     def _render(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> tuple[Any, ...]:
-        self._bodies.tell_all(self.primitives.poses)
+        self._bodies.sync_all(self.primitives.poses)
         eye, (forward, _, up) = camera.stance(sensor)
         left, top, right, bottom = window
         # The sides of the frustum of the window alone, where it cuts the near plane.

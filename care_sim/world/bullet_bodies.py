@@ -1,4 +1,4 @@
-"""The bodies that PyBullet knows, in clients that are used again and again."""
+"""Bodies in PyBullet clients that are reused."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
@@ -6,27 +6,27 @@ from weakref import finalize
 
 import numpy as np
 
-from care_sim.base.extras import STANDARD_ERROR, silenced
+from care_sim.base.extras import STANDARD_ERROR, silence_output
 from care_sim.core.arrays import Floats, Integers
 from care_sim.world.bodies import Part
 
-with silenced(STANDARD_ERROR):  # where it prints its build time
+with silence_output(STANDARD_ERROR):  # where it prints its build time
     import pybullet
 
 __all__ = ["MOST_PARTS", "LentClient", "borrow", "give_back", "leave", "pybullet"]
 
 MOST_FREE = 4
-"""Clients kept for whoever borrows next. Each holds 28 MB, and another one takes 14 ms."""
+"""Clients kept for reuse. Each holds 28 MB; a new one takes 14 ms."""
 
 _CLOSED = -1
-"""What PyBullet calls no client."""
+"""PyBullet's number for no client."""
 
 _free: list[int] = []
 
 
 class LentClient:
-    """A client that is borrowed when it is first asked for: to empty one takes a millisecond, and
-    many a world never needs it. Where it is not closed, it is given back with the last reference.
+    """A client that is borrowed at its first use. Emptying a client takes a millisecond, and many
+    worlds never need one. An unclosed client is given back with its last reference.
     """
 
     def __init__(self) -> None:
@@ -37,8 +37,8 @@ class LentClient:
     def number(self) -> int:
         """Return PyBullet's number of the shape."""
         if self._number is None:
-            # Whoever does not close leaves the client to others when it is collected. At the end of
-            # the process there are none.
+            # An unclosed client is given back at garbage collection. At the end of the process
+            # there are none.
             self._number = borrow()
             self._abandoned = finalize(self, leave, self._number)
             self._abandoned.atexit = False
@@ -57,13 +57,13 @@ class LentClient:
         """Give the client back; calling it again does nothing."""
         if self._abandoned is not None and self._abandoned.detach():
             give_back(self.number)
-        # PyBullet refuses whoever asks it now.
+        # From now on PyBullet refuses calls of this client.
         self._number = _CLOSED
 
 
 def borrow() -> int:
-    """An empty client. One that somebody else has closed or filled meanwhile is no trouble."""
-    # Whatever finalisers have left is looked at only here, where PyBullet may be called.
+    """Return an empty client. Clients that other code has closed or filled meanwhile do no harm."""
+    # Clients left by finalisers are handled only here, where PyBullet may be called.
     _end_surplus()
     while (client := _next_free()) is not None:
         if pybullet.isConnected(client):
@@ -73,14 +73,14 @@ def borrow() -> int:
 
 
 def give_back(client: int) -> None:
-    """Leave a client to whoever borrows the next one."""
+    """Return a client to the pool."""
     leave(client)
     _end_surplus()
 
 
 def leave(client: int) -> None:
-    """Give a client back where PyBullet may not be called, as in a finaliser: garbage is collected
-    in the middle of its calls, too.
+    """Give a client back without calling PyBullet, as finalisers must: garbage collection may run
+    within its calls.
     """
     _free.append(client)
 
@@ -100,12 +100,12 @@ def _end_surplus() -> None:
 
 
 NO_BODY = -1
-"""The id where there is no body, ours and PyBullet's."""
+"""The id for no body, ours and PyBullet's."""
 OPAQUE, TRANSPARENT = 1, 2
 """Groups of bodies that rays hit, and that they pass."""
 
 MOST_PARTS = 16
-"""Of one body: PyBullet crashes on more (`MAX_COMPOUND_COLLISION_SHAPES`)."""
+"""Most parts of one body: PyBullet crashes on more (`MAX_COMPOUND_COLLISION_SHAPES`)."""
 
 _SHAPES = {
     "box": pybullet.GEOM_BOX,
@@ -126,9 +126,8 @@ class _Shape(NamedTuple):
 
 class BulletBodies:
     """Bodies by id, which count from 0 in the order in which they are added, the ground first.
-
-    PyBullet learns of a body, and of its pose, when it is first asked about it: most bodies of a
-    street are never asked about, and to make one takes up to 2 ms.
+    PyBullet gets a body and its pose only when they are first needed. Most bodies of a street are
+    never needed, and making one takes up to 2 ms.
     """
 
     def __init__(self, client: LentClient, ground: bool) -> None:
@@ -136,21 +135,21 @@ class BulletBodies:
         self._ground = ground
         self._shapes: dict[int, _Shape] = {}
         self._moved: set[int] = set()
-        # By id the numbers of PyBullet, which counts in the order in which it learns of bodies.
+        # PyBullet's numbers by id. PyBullet counts in the order in which it gets bodies.
         self._numbers: dict[int, int] = {}
         self._count = int(ground)
 
     def __getstate__(self) -> dict[str, Any]:
-        # A copy has a client of its own, which knows nobody yet.
+        # A copy has its own client, which is still empty.
         return vars(self) | {"_numbers": {}, "_moved": set(self._shapes)}
 
     @property
     def made(self) -> int:
-        """How many of them PyBullet knows."""
+        """The number of bodies that PyBullet has."""
         return len(self._numbers)
 
     def add(self, parts: Sequence[Part], seen: Sequence[Part], group: int) -> int:
-        """Take in a body of `parts`, of which cameras are to see `seen`; its id."""
+        """Add a body of `parts`, of which cameras see `seen`, and return its id."""
         body = self._count
         self._count += 1
         self._shapes[body] = _Shape(parts, seen, group)
@@ -158,28 +157,28 @@ class BulletBodies:
         return body
 
     def moved(self, bodies: Iterable[int]) -> None:
-        """Take note that bodies are elsewhere."""
+        """Mark bodies as moved."""
         self._moved.update(bodies)
 
-    def tell_all(self, poses: Floats) -> None:
-        """Let PyBullet know of every body, and where it is: `poses` (m, 7) by id."""
-        self._tell(self._moved, poses)
+    def sync_all(self, poses: Floats) -> None:
+        """Pass every body to PyBullet, at its `poses` (m, 7) by id."""
+        self._sync(self._moved, poses)
 
-    def tell(self, bodies: Sequence[int], poses: Floats) -> list[int]:
-        """Let PyBullet know of some bodies, as `tell_all` of all; its numbers of them."""
-        self._tell(self._moved.intersection(bodies), poses)
+    def sync(self, bodies: Sequence[int], poses: Floats) -> list[int]:
+        """Pass some bodies to PyBullet, and return its numbers of them."""
+        self._sync(self._moved.intersection(bodies), poses)
         return [self._numbers[body] for body in bodies]
 
     def ids_of(self, numbers: Integers) -> Integers:
-        """The ids of bodies that PyBullet tells by its own numbers; NO_BODY stays."""
+        """Return the ids of bodies given by PyBullet's numbers; NO_BODY stays."""
         # NO_BODY, which is -1, picks the last entry.
         ids = np.full(len(self._numbers) + 1, NO_BODY)
         ids[list(self._numbers.values())] = list(self._numbers)
         return np.asarray(ids[numbers])
 
     def put(self, body: int, pose: Sequence[float]) -> int:
-        """Let PyBullet know of a body, and that it is at `pose`: x, y, z and the quaternion x, y,
-        z, w. Its number of it.
+        """Pass a body to PyBullet at `pose` (x, y, z and the quaternion x, y, z, w) and return its
+        number.
         """
         if body not in self._numbers:
             self._numbers[body] = self._make(self._shapes[body])
@@ -191,7 +190,7 @@ class BulletBodies:
         return number
 
     def clearance(self, number: int, other: int, within: float) -> float:
-        """Smallest distance between two hulls where PyBullet has them, by its numbers; see
+        """Return the smallest distance between two hulls, given by PyBullet's numbers. See
         `care_sim.world.bullet.BulletWorld.clearance`.
         """
         points = pybullet.getClosestPoints(
@@ -199,7 +198,7 @@ class BulletBodies:
         )
         return float(min((point[8] for point in points), default=np.inf))
 
-    def _tell(self, moved: Iterable[int], poses: Floats) -> None:
+    def _sync(self, moved: Iterable[int], poses: Floats) -> None:
         if self._ground and 0 not in self._numbers:
             self._numbers[0] = self._make_ground()
         # A copy: `moved` may be the very set that shrinks here. In the order of ids, so that what

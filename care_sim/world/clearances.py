@@ -1,9 +1,8 @@
-"""From the ego to the first-sighting actor, hull to hull, in one world or many.
+"""Distances from the ego to the first-sighting actor, hull to hull, in one or many worlds, and the
+ego's contacts.
 
-PyBullet's exact distance costs more than all else that is scored. So the moments are kept, with a
-bound that is no greater, and it is asked about those alone that matter.
-
-And which bodies the egos touch.
+PyBullet's exact distance costs more than the rest of the scoring. So moments are stored with a
+lower bound, and PyBullet computes only the moments that matter.
 """
 
 import math
@@ -22,7 +21,7 @@ from care_sim.world.contact import (
     PADDING_M,
     ClearanceJudge,
     StandIns,
-    judge_here,
+    borrow_judge,
     least_gap,
 )
 
@@ -32,17 +31,17 @@ class Clearances:
 
     def __init__(self, worlds: int, steps: int):
         self._kinds: list[tuple[BodyKind, BodyKind] | None] = [None] * worlds
-        # What stands in for both, of the judge that made it.
+        # The stand-ins of both bodies, and the judge that made them.
         self._pairs: list[tuple[ClearanceJudge, StandIns] | None] = [None] * worlds
-        # By world and step, of which the first is 1: the poses of the two, what they are apart at
-        # least, and exactly where it is known, else NaN.
+        # By world and step (from 1): the poses of both, a lower bound of their distance, and the
+        # exact distance, NaN where unknown.
         self._poses = np.zeros((worlds, steps + 1, 2, 7))
         self._bounds = np.full((worlds, steps + 1), np.inf)
         self._known = np.full((worlds, steps + 1), np.nan)
 
     def begin(self, world: int, kinds: tuple[BodyKind, BodyKind] | None) -> None:
-        """Forget the episode that was, and take in the kinds of the ego and of the actor whom a new
-        one is about, None without one.
+        """Begin an episode with the kinds of the ego and of the first-sighting actor, None without
+        one.
         """
         self._kinds[world] = kinds
         self._pairs[world] = None
@@ -61,17 +60,16 @@ class Clearances:
         whose: tuple[Integers, Integers],
         nearest_m: Floats,
     ) -> None:
-        """Note where bodies are, by their `boxes` and `poses` (W, B, 7), at the `steps` (W,) to
-        which the worlds have come that are `live`. It is about the egos and the actors `whose` ids
-        (W,) are given, NO_BODY for none. What is `nearest_m` (W,) from centre to centre falls to
-        what it is now.
+        """Store the places of bodies, `boxes` and `poses` (W, B, 7), at the `steps` (W,) of the
+        `live` worlds. `whose` (W,) are the ids of the egos and of the actors, NO_BODY without one.
+        Lowers `nearest_m` (W,), from centre to centre, to its current value.
         """
         tables = self._poses, self._bounds, nearest_m
         _note(live, steps, boxes, poses, *whose, *tables)
 
     def least_since(self, steps: Integers, count: int, live: Mask, exact_below: float) -> Floats:
-        """(W,) the least clearance of the last `count` of all `steps` (W,) so far, metres. What is
-        above `exact_below` may be a bound that is above it, too, and no greater than the clearance.
+        """Return (W,) the least clearance of the last `count` of all `steps` (W,) so far, metres. A
+        value above `exact_below` may be a lower bound that is also above it.
         """
         recent = steps[:, None] - np.arange(count)
         bounds = self._bounds[np.arange(len(steps))[:, None], recent]
@@ -83,7 +81,7 @@ class Clearances:
         return least
 
     def least(self, world: int, begin: int, end: int) -> float:
-        """The least clearance of a world from its step `begin` to the one before `end`."""
+        """Return the least clearance of a world from its step `begin` to the one before `end`."""
         bounds = self._bounds[world, begin:end]
         order = np.argsort(bounds)
         return self._least(world, (begin + order).tolist(), bounds[order].tolist(), math.inf)
@@ -91,9 +89,9 @@ class Clearances:
     def _least(
         self, world: int, steps: Sequence[int], bounds: Sequence[float], exact_below: float
     ) -> float:
-        """The least clearance at some `steps`, whose `bounds` ascend."""
-        # First the moment at which they could be nearest. Whoever was farther apart than what is
-        # found by then need not be asked about.
+        """Return the least clearance at some `steps`, whose `bounds` ascend."""
+        # Begin with the smallest bound. Moments with a bound above the smallest distance so far
+        # need no exact distance.
         least = math.inf
         for step, bound in zip(steps, bounds, strict=True):
             if bound > least or bound == math.inf:
@@ -107,7 +105,7 @@ class Clearances:
         known = float(self._known[world, step])
         kinds, pair = self._kinds[world], self._pairs[world]
         if math.isnan(known) and kinds is not None:
-            judge = judge_here()
+            judge = borrow_judge()
             if pair is None or pair[0] is not judge:
                 pair = self._pairs[world] = judge, judge.stand_ins(*kinds)
             known = judge.clearance(pair[1], self._poses[world, step])
@@ -141,8 +139,8 @@ def _note(
 
 
 class Impacts:
-    """The egos' contacts in `worlds` worlds, whose steps last `step_s` seconds. The exact distance
-    is PyBullet's, and it is asked about few bodies: those that are near.
+    """The egos' contacts in `worlds` worlds, whose steps last `step_s` seconds. PyBullet computes
+    exact distances, for near bodies only.
     """
 
     def __init__(self, worlds: int, step_s: float):
@@ -150,7 +148,7 @@ class Impacts:
         self._kinds: list[Mapping[int, BodyKind]] = [{}] * worlds
 
     def begin(self, world: int, kinds: Mapping[int, BodyKind]) -> None:
-        """Take in the kinds of the bodies of a world, the ego's among them, by id."""
+        """Begin an episode of a world with the kinds of its bodies by id, the ego's included."""
         self._kinds[world] = kinds
 
     def now(
@@ -163,16 +161,16 @@ class Impacts:
         egos: Integers,
         speeds: Floats,
     ) -> Iterator[tuple[int, Impact]]:
-        """The worlds among those `looked` at (W,) whose ego touches a body, and the impact. Bodies,
-        `counts` (W,) of them, are where `boxes` and `poses` (W, B, 7) are, and were `before` a step
-        ago; the `egos` (W,) have `speeds` (W,).
+        """Return the `looked` at (W,) worlds whose ego touches a body, with the impact. Each world
+        has `counts` (W,) bodies at `boxes` and `poses` (W, B, 7), which were at `before` a step
+        ago. The `egos` (W,) drive at `speeds` (W,).
         """
         found, near = _near(looked, counts, boxes, egos, CONTACT_REACH_M)
         for world in np.flatnonzero(found).tolist():
             ego, kinds = int(egos[world]), self._kinds[world]
             for body in near[world, : found[world]].tolist():
                 kind = kinds[body]
-                if judge_here().touch((kinds[ego], kind), poses[world, [ego, body]]):
+                if borrow_judge().touch((kinds[ego], kind), poses[world, [ego, body]]):
                     moved = boxes[world, body, :2] - before[world, body, :2]
                     own = boxes[world], ego, float(speeds[world])
                     yield world, Impact.on(body, kind.name, *own, moved / self._step_s)
@@ -183,7 +181,9 @@ class Impacts:
 def _near(
     looked: Mask, counts: Integers, boxes: Floats, egos: Integers, within: float
 ) -> tuple[Integers, Integers]:
-    """How many bodies may be `within` metres of the ego in each world (W,), and which (W, B)."""
+    """Return the number of bodies that may be `within` metres of the ego in each world (W,), and
+    their ids (W, B).
+    """
     found = np.zeros(len(looked), np.int64)
     near = np.empty((len(looked), boxes.shape[1]), np.int64)
     for world in range(len(looked)):

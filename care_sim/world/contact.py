@@ -1,4 +1,4 @@
-"""Contact and clearance: what happens to the ego while its world moves on to the next keyframe."""
+"""Contact and clearance of the ego between keyframes."""
 
 import math
 import threading
@@ -18,7 +18,9 @@ PADDING_M = 0.05
 
 @compiled()
 def least_gap(box: Floats, other: Floats) -> float:
-    """What two boxes (7,) on the ground are apart at least, metres; -inf where they may overlap."""
+    """Return a lower bound of the distance of two boxes (7,) on the ground, metres; -inf where they
+    may overlap.
+    """
     # In the plane, and in the axes of the first: there an upright rectangle holds the other.
     dx, dy, turned = other[0] - box[0], other[1] - box[1], other[6] - box[6]
     cos, sin = math.cos(box[6]), math.sin(box[6])
@@ -33,11 +35,12 @@ def least_gap(box: Floats, other: Floats) -> float:
 
 @compiled(brief=True)
 def nearest_parts(own: Floats, other: Floats, poses: Floats) -> tuple[Floats, Integers]:
-    """What the parts of two bodies are apart at least, metres, ascending, (n * m,); and which two
-    each tells of: i * m + j is part i of n and part j of m. -inf where they may overlap.
+    """Return lower bounds of the distances between the parts of two bodies, (n * m,) metres,
+    ascending, and their pairs. Pair i * m + j is part i of n and part j of m. The bound is -inf
+    where parts may overlap.
 
-    Of the parts the boxes are told, (n, 6) and (m, 6), centre and size in the frame of their body;
-    the bodies stand at `poses` (2, 7) as in `care_sim.world.body_tables.Primitives.poses`.
+    The boxes of parts are (n, 6) and (m, 6): centre and size in the frame of their body. The bodies
+    stand at `poses` (2, 7) as in `care_sim.world.body_tables.Primitives.poses`.
     """
     boxes, others = _standing_parts(own, poses[0]), _standing_parts(other, poses[1])
     # A body that does not stand upright is in no such box.
@@ -53,7 +56,7 @@ def nearest_parts(own: Floats, other: Floats, poses: Floats) -> tuple[Floats, In
             apart = math.hypot(aside, above)
             gap = apart if apart > 0 and not tilted else -math.inf
 
-            # Each takes its place among those before it: they are few.
+            # Insertion sort: there are few parts.
             place = count
             while place and gaps[place - 1] > gap:
                 gaps[place], pairs[place] = gaps[place - 1], pairs[place - 1]
@@ -84,12 +87,12 @@ CONTACT_REACH_M = 0.5
 padded.
 """
 MOST_KINDS = 256
-"""A judge that worlds share knows no more kinds of bodies: streets may have kinds of their own."""
+"""Most kinds of bodies in a shared judge, since streets may have kinds of their own."""
 
 
 class StandIn(NamedTuple):
-    """What stands in for a body: a body for each of its n parts, and the boxes of these, (n, 6)
-    centre and size in the frame of the body.
+    """Stand-ins of a body: one body per part, and the boxes of the n parts, (n, 6) centre and size
+    in the frame of the body.
     """
 
     bodies: list[int]
@@ -101,11 +104,12 @@ StandIns = tuple[StandIn, StandIn]
 
 
 class ClearanceJudge:
-    """The distances of `BulletWorld.clearance`, to the last bit, between an ego and another body,
-    given by their kinds and poses, asked of one client of PyBullet for any worlds.
+    """Computes the clearance between an ego and another body, given by kinds and poses, with one
+    PyBullet client for all worlds. Bit-identical to `BulletWorld.clearance`.
 
-    The parts of a body stand apart there: PyBullet measures every two parts of two bodies, and most
-    of them are too far apart to matter. It is asked about those that could be the nearest.
+    Each part is a body of its own in the client. PyBullet measures every pair of parts of two
+    bodies, and most pairs are too far apart to matter. So only pairs that could be the nearest are
+    measured.
     """
 
     def __init__(self) -> None:
@@ -115,7 +119,7 @@ class ClearanceJudge:
         self._others: dict[BodyKind, StandIn] = {}
 
     def stand_ins(self, ego: BodyKind, other: BodyKind) -> StandIns:
-        """What stands in for an ego of one kind and another body of the other."""
+        """Return the stand-ins of an ego of one kind and of another body."""
         return self._known(self._egos, ego), self._known(self._others, other)
 
     def clearance(
@@ -124,8 +128,8 @@ class ClearanceJudge:
         poses: Floats | Sequence[Sequence[float]],
         within: float = 100.0,
     ) -> float:
-        """Smallest distance between the hulls of two stand-ins at `poses` (2, 7), as in
-        `Primitives.poses`, metres; negative when they overlap, inf beyond `within`.
+        """Return the smallest distance between the hulls of two stand-ins at `poses` (2, 7), as in
+        `Primitives.poses`, metres. Negative if they overlap, inf beyond `within`.
         """
         ego, other = bodies
         places = np.asarray(poses, float)
@@ -142,15 +146,15 @@ class ClearanceJudge:
         return least
 
     def touch(self, kinds: tuple[BodyKind, BodyKind], poses: Floats) -> bool:
-        """Whether the hulls of an ego and another body of these kinds touch at `poses` (2, 7), as
-        in `Primitives.poses`.
+        """Return True if the hulls of an ego and another body of these kinds touch at `poses` (2,
+        7), as in `Primitives.poses`.
         """
         return self.clearance(self.stand_ins(*kinds), poses, CONTACT_REACH_M) <= 0.0
 
     @property
-    def serves_on(self) -> bool:
-        """Whether it can be asked further: it knows few kinds, and nobody else has closed or
-        emptied its client.
+    def is_usable(self) -> bool:
+        """Return True while the judge holds few kinds and no other code has closed or emptied its
+        client.
         """
         made = self._bodies.made
         if not made:
@@ -178,10 +182,10 @@ class _Shared(threading.local):
 _SHARED = _Shared()
 
 
-def judge_here() -> ClearanceJudge:
-    """The judge that the worlds of this thread share. It serves until the next call, and in this
-    thread alone.
+def borrow_judge() -> ClearanceJudge:
+    """Return the judge that the worlds of this thread share. Use it until the next call, and in
+    this thread only.
     """
-    if _SHARED.judge is None or not _SHARED.judge.serves_on:
+    if _SHARED.judge is None or not _SHARED.judge.is_usable:
         _SHARED.judge = ClearanceJudge()
     return _SHARED.judge

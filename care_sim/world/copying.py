@@ -1,7 +1,7 @@
-"""Refuse to copy a world that holds functions with a state of their own.
+"""Refuse to copy a world that holds functions with their own state.
 
-`copy` and `pickle` keep a function as it is. A closure over an actor would go on to move, and to
-read, the actor of the world that was copied; `values.pop` would take from the list of that world.
+`copy` and `pickle` keep a function as it is. A copied world's closure over an actor would still
+move and read the actor of the original world. `values.pop` would take from the original's list.
 """
 
 import dis
@@ -15,7 +15,7 @@ from typing import Any
 from care_sim.base.errors import InvalidInput, error_line
 
 _NOTHING = (repr, ("",))
-"""What the pickler writes in the place of what it passes over."""
+"""Placeholder that the pickler writes for skipped objects."""
 _UNCHANGING = (type(None), bool, int, float, complex, str, bytes, type, ModuleType)
 
 

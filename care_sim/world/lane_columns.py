@@ -1,7 +1,6 @@
-"""The vehicles of many worlds that keep their lanes, as columns: what highway-env moves one by one.
-
-To the last bit, they go as the `StraightVehicle` and the `LaneDriver` of `care_sim.world.traffic`
-that keep a lane along x. The model is the intelligent driver model with the numbers of highway-env.
+"""Vehicles of many worlds that keep their lanes, as columns; highway-env moves them one by one.
+Bit-identical to a `StraightVehicle` and a `LaneDriver` of `care_sim.world.traffic` that keep a lane
+along x. The model is the intelligent driver model with the numbers of highway-env.
 """
 
 import math
@@ -22,9 +21,9 @@ from care_sim.world.lane_flow import (
 from care_sim.world.traffic import LaneKeeper
 
 _FASTEST_MPS = 40.0
-"""highway-env brings down whoever is faster."""
+"""highway-env slows faster vehicles down to this speed."""
 _LEAST_APART_M = 0.01
-"""What highway-env divides by at least."""
+"""Smallest divisor of highway-env."""
 _TWO_ROOTS = 2 * math.sqrt(GAINING_MPS2 * BRAKING_MPS2)
 _X, _WANTED, _LANE_Y, _START_X, _REACH = 0, 2, 3, 4, 5
 SPEED = 1
@@ -44,7 +43,7 @@ class LaneColumns:
         self.rows = np.zeros((worlds, 2, len(LaneKeeper._fields)))
 
     def begin(self, world: int, vehicles: Sequence[LaneKeeper]) -> None:
-        """Take in the vehicles of a world."""
+        """Begin an episode with the vehicles of a world."""
         self.rows = filled(self.rows, world, np.array(vehicles, float))
         self.counts[world] = len(vehicles)
 
@@ -65,8 +64,8 @@ class LaneColumns:
 def _look_ahead(
     moved: Mask, counts: Integers, rows: Floats, shares: Floats, ratios: Floats
 ) -> None:
-    """Write for every driver what share of its wanted speed it has, `shares` (W, V), and what share
-    of the gap to whom it follows it would keep, `ratios` (W, V), 0 with nobody ahead.
+    """Write each driver's share of its wanted speed, `shares` (W, V), and the wanted gap over the
+    actual one, `ratios` (W, V), 0 with no vehicle ahead.
     """
     for world in range(len(counts)):
         if not moved[world]:
@@ -86,7 +85,7 @@ def _look_ahead(
 
 @compiled(brief=True)
 def _ahead(rows: Floats, count: int, own: int) -> int:
-    """The vehicle that is the next ahead in its lane, of equally near ones the last; -1 if none."""
+    """Return the next vehicle ahead in the lane, the last of equally near ones; -1 if none."""
     row = rows[own]
     place = row[_X] - row[_START_X]
     nearest, found = math.inf, -1

@@ -1,4 +1,4 @@
-"""Lanes along x and the vehicles on them: those of highway-env, to the last bit, at less cost."""
+"""Lanes along x and their vehicles: bit-identical to highway-env's, and cheaper."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -18,8 +18,8 @@ with package_alone("highway_env"):
     from highway_env.vehicle.objects import Obstacle as Obstacle
 
 _DRAWS = np.random.RandomState(0)
-"""highway-env's roads want a generator, and each makes one from the system's entropy where it is
-given none. Nothing here draws from it: neither vehicles nor behaviours are random.
+"""highway-env's roads need a generator, and make one from the system's entropy by default. No
+vehicle or behaviour draws from it.
 """
 
 
@@ -32,7 +32,7 @@ class LaneAlongX(StraightLane):  # type: ignore[misc]
     """A lane from (-x, y) to (x, y) or back."""
 
     def local_coordinates(self, position: Sequence[float]) -> tuple[float, float]:
-        """Metres along the lane and to its side: those of `StraightLane`, to the last bit, without
+        """Return metres along the lane and to its side. Bit-identical to `StraightLane`, without
         its dot products of axes that are 0 and 1 or -1.
         """
         # The 0.0 stands for the product with the other axis: without it the side could be -0.0.
@@ -46,7 +46,7 @@ class LaneAlongX(StraightLane):  # type: ignore[misc]
 
 
 class StraightVehicle(Vehicle):  # type: ignore[misc]
-    """A vehicle of highway-env, to the last bit, that asks for no sine and no cosine while it goes
+    """A vehicle bit-identical to highway-env's that computes no sine or cosine while it goes
     straight ahead.
     """
 
@@ -72,15 +72,16 @@ class StraightVehicle(Vehicle):  # type: ignore[misc]
 
 
 class LaneDriver(StraightVehicle, IDMVehicle):  # type: ignore[misc]
-    """An IDM driver who neither steers nor looks for the nearest lane in the middle of one. Its
-    numbers are plain floats, which NumPy would clip one by one. It moves as highway-env's, to the
-    last bit, as long as it neither changes lanes by itself nor is asked whether it crashed: then
-    nothing reads the timer and the flag that are left alone here.
+    """An IDM driver who, in the middle of a lane, neither steers nor looks for the nearest lane.
+    Its numbers are plain floats, which NumPy would clip one by one.
+
+    Bit-identical to highway-env's driver as long as it does not change lanes by itself and nothing
+    reads its crash flag. Its timer and flag are not updated.
     """
 
     def act(self, action: dict[str, float] | str | None = None) -> None:
         """Decide on the next step."""
-        # Who changes lanes, or has come to the end of one, decides as highway-env does.
+        # Drivers who change lanes, or reach the end of one, decide as highway-env does.
         lane = self.lane
         along = lane.local_coordinates(self.position)[0]
         if (
@@ -101,7 +102,7 @@ class LaneDriver(StraightVehicle, IDMVehicle):  # type: ignore[misc]
         front_vehicle: Vehicle | None = None,
         rear_vehicle: Vehicle | None = None,
     ) -> float:
-        """m/s^2 that `ego_vehicle` wishes for behind `front_vehicle`, if any."""
+        """Return the acceleration of `ego_vehicle` behind `front_vehicle`, if any, m/s^2."""
         # The powers are NumPy's: Python's round otherwise.
         limit = ego_vehicle.lane.speed_limit
         wanted_mps = min(max(ego_vehicle.target_speed, 0), limit)

@@ -24,7 +24,7 @@ MOST_MPS2 = 6.0
 GAINING_MPS2 = 3.0
 BRAKING_MPS2 = 5.0
 STANDING_GAP_M = 10.0
-"""From centre to centre, what an IDM driver leaves before what stands ahead."""
+"""Gap that an IDM driver leaves to a standing vehicle, from centre to centre, metres."""
 TIME_GAP_S = 1.5
 EXPONENT = 4.0
 
@@ -45,7 +45,7 @@ class LaneFlow:
 
     def step(self, dt: float, others: Sequence[tuple[float, float]] = ()) -> None:
         """Let every driver decide, then move all by `dt` seconds. `others` are place and speed of
-        what else is in the lane, such as a car that is no IDM driver's.
+        other things in the lane, such as the ego.
         """
         accelerations = self._accelerations(others)
         self.places += self.speeds * dt
@@ -67,8 +67,7 @@ def _following(free: Floats, places: Floats, speeds: Floats, others: Floats) -> 
     """
     accelerations = np.empty(len(places))
     for n in range(len(places)):
-        # Who drives ahead: the nearest of all whose place is greater, of equally near ones the
-        # first.
+        # The vehicle ahead is the nearest with a greater place, the first of equally near ones.
         gap, lead_mps = math.inf, 0.0
         for other in range(len(places)):
             apart = places[other] - places[n]
@@ -108,12 +107,10 @@ class Crossing:
 
 @dataclass(frozen=True)
 class FlowingLane:
-    """A lane and who drives in it.
-
-    `poses_at` gives the world poses (n, 3) of places (n,) along the lane. `stop_m` is where its
-    drivers give way, inf where they need not. The ego is in the lane while it is between
-    `ego_from_m` and `ego_to_m` along its route, and its place is then `ego_ahead_m` farther.
-    Drivers stop before whoever is in one of the `crossings`.
+    """A lane and its vehicles. `poses_at` returns the world poses (n, 3) of places (n,) along the
+    lane. `stop_m` is where its drivers give way, inf if they need not. The ego is in the lane while
+    it is between `ego_from_m` and `ego_to_m` along its route. Its place in the lane is then
+    `ego_ahead_m` farther. Drivers stop for anybody in one of the `crossings`.
     """
 
     flow: LaneFlow
@@ -125,8 +122,8 @@ class FlowingLane:
     crossings: list[Crossing] = field(default_factory=list)
 
     def others(self, time: float, ego_m: float, ego_speed: float) -> list[tuple[float, float]]:
-        """Place and speed of what is in the lane at `time` besides its drivers, for an ego `ego_m`
-        along its route.
+        """Return place and speed of everything but drivers in the lane at `time`, for an ego
+        `ego_m` along its route.
         """
         found = self._stop_line()
         if self.ego_from_m <= ego_m < self.ego_to_m:
@@ -136,8 +133,8 @@ class FlowingLane:
         return found
 
     def foreseen(self, steps: int, dt: float) -> Floats:
-        """(steps, n) places of the drivers from now on, every `dt` seconds, if neither the ego nor
-        anybody who crosses makes them brake.
+        """Return (steps, n) future places of the drivers, every `dt` seconds, if neither the ego
+        nor a crosser makes them brake.
         """
         flow = deepcopy(self.flow)
         places = np.empty((steps, len(flow.places)))
@@ -147,13 +144,13 @@ class FlowingLane:
         return places
 
     def _stop_line(self) -> list[tuple[float, float]]:
-        """Place and speed of what stands where drivers give way, if they do."""
+        """Return place and speed of the obstacle at the stop line, if drivers give way."""
         return [(self.stop_m, 0.0)] if np.isfinite(self.stop_m) else []
 
 
 class StreetTraffic:
-    """All lanes of a street. Drivers follow whom they have ahead in their lane, the ego too, and
-    stop before who crosses it.
+    """All lanes of a street. Drivers follow the vehicle ahead in their lane, the ego included, and
+    stop for crossers.
     """
 
     def __init__(self, lanes: Sequence[FlowingLane]):

@@ -1,4 +1,4 @@
-"""How bodies move that no traffic moves: walkers, crossers, lane changes and straight ways."""
+"""Motions outside the traffic: walkers, crossers, lane changes and straight ways."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -70,10 +70,9 @@ class Walk:
 
 
 class Crosser:
-    """Waits at the beginning of a walk and sets off when the ego has `lead_s` seconds left to its
-    line. Whom traffic would then run over waits on, as people do who see it come, and stays.
-
-    `may_go` tells whether the way is free of other traffic.
+    """Waits at the start of a walk and sets off when the ego has `lead_s` seconds left to its line.
+    If other traffic would run over the crosser then, the crosser stays, as people do who see it
+    come. `may_go` returns True if the way is free of other traffic.
     """
 
     walk: Walk
@@ -87,15 +86,15 @@ class Crosser:
         self._may_go = may_go
 
     def look(self, time: float, seconds_left: Callable[[], float]) -> None:
-        """Decide at `time`, seconds from the start; to be called at every world step.
-        `seconds_left` tells what the ego has, and is asked only until the decision: it takes long.
+        """Decide at `time`, seconds from the start. Call it at every world step. `seconds_left`
+        returns the ego's time to the line; it is slow and called only until the decision.
         """
         if self.went is not None:
             return
         left = seconds_left()
         if left > self._lead_s:
             return
-        # World steps are short but not endless: it set off a moment ago, when the time was right.
+        # World steps have a length: the exact moment to set off was within the last step.
         self.walk = self.walk.setting_off(time - (self._lead_s - left))
         self.went = self._may_go(self.walk)
 
@@ -114,15 +113,15 @@ class Meeting:
     who: str
     """Its kind in the catalogue."""
     side: str
-    """From which it comes, "left" or "right"."""
+    """The side that it comes from, "left" or "right"."""
     along_m: float
-    """Where on the route its line is."""
+    """Place of its line on the route."""
     way: str
-    """How the route runs while it comes into sight: "straight", "bend" or "turn"."""
+    """Shape of the route while it comes into sight: "straight", "bend" or "turn"."""
     course: str
-    """What comes of it if the ego drives on as it means to: "conflict", "near-miss" or "stop"."""
+    """Result if the ego drives on as planned: "conflict", "near-miss" or "stop"."""
     occluder: str
-    """The kind of what hides it."""
+    """Kind of the occluder."""
     occluder_reported: bool
     """Whether perception knows the occluder's class."""
     crosser: Crosser
@@ -130,8 +129,8 @@ class Meeting:
 
 @dataclass(frozen=True)
 class LaneChange:
-    """Drives along x at `speed_mps` from `start` (x, y) at time 0, and from `begins_s` on across at
-    `lateral_mps` until it is at `to_y`. Metres, seconds, world frame.
+    """Drives along x at `speed_mps` from `start` (x, y) at time 0. From `begins_s` on it also moves
+    across at `lateral_mps`, until it is at `to_y`. Metres, seconds, world frame.
 
     It keeps its heading, as the cut-ins of UN Regulation 157 do: their distances are measured
     between boxes along the road.
@@ -162,9 +161,8 @@ class LaneChange:
 
 @dataclass(frozen=True)
 class StraightWay:
-    """It is at `place` (x, y) at `time`, and goes along `heading` at `speed` before and after.
-
-    Metres, seconds, radians, world frame.
+    """Motion along `heading` at a constant `speed`, through `place` (x, y) at `time`. Metres,
+    seconds, radians, world frame.
     """
 
     place: tuple[float, float]
@@ -193,8 +191,8 @@ class LinearMotion:
     rates: Floats
 
     def poses(self, poses: Floats, seconds: float) -> Floats:
-        """(m, 7) where bodies are `seconds` later that now stand at `poses` (m, 7: x, y, z,
-        quaternion x, y, z, w).
+        """Return (m, 7) the poses `seconds` later of bodies at `poses` (m, 7: x, y, z, quaternion
+        x, y, z, w).
         """
         moved = poses.copy()
         moved[:, :2] += self.rates[:, :2] * seconds
@@ -209,13 +207,13 @@ class LinearMotion:
         return moved
 
     def sensor(self, sensor: Frame, seconds: float) -> Frame:
-        """Where a frame that is fixed on the ego is `seconds` later."""
+        """Return a frame fixed on the ego `seconds` later."""
         ((x, y),) = self._carried(sensor, np.array([seconds])).tolist()
         return replace(sensor, x=x, y=y, yaw=sensor.yaw + float(self.ego_rates[2]) * seconds)
 
     def compensated(self, points: Floats, sensor: Frame, seconds: Floats) -> Floats:
-        """(n, 3) in the frame `sensor` of now the `points` (n, 3) that were measured `seconds` (n,)
-        later in the frame that it is then.
+        """Return (n, 3) `points` in the current frame `sensor`. They were measured `seconds` (n,)
+        later, in the sensor's frame of that time.
         """
         turns = self.ego_rates[2] * seconds
         world = turned(sensor.vectors_to_world(points), turns)
@@ -223,7 +221,7 @@ class LinearMotion:
         return sensor.vectors_to_local(world)
 
     def _carried(self, sensor: Frame, seconds: Floats) -> Floats:
-        """(n, 2) world places of the origin of a frame on the ego `seconds` (n,) later."""
+        """Return (n, 2) the world places of a frame's origin on the ego `seconds` (n,) later."""
         middle = np.array(self.ego[:2])
         levers = np.tile(sensor.origin[:2] - middle, (len(seconds), 1))
         driven = self.ego_rates[:2] * seconds[:, None]
@@ -232,8 +230,8 @@ class LinearMotion:
 
 
 def rates_between(before: Floats, after: Floats, seconds: float) -> Floats:
-    """(n, 3) rates that lead from poses (n, 3: x, y, heading) to others in `seconds`, turning the
-    shorter way.
+    """Return (n, 3) the rates that lead from poses (n, 3: x, y, heading) to others in `seconds`,
+    turning the shorter way.
     """
     changes = after - before
     changes[:, 2] = np.remainder(changes[:, 2] + np.pi, 2 * np.pi) - np.pi

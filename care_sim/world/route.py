@@ -1,4 +1,4 @@
-"""The way that a car is to go: straights and bends of one curvature each, one after the other."""
+"""Routes of a car: a sequence of straights and bends of constant curvature."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,9 +17,9 @@ Leg = tuple[float, float]
 _SHARPEST_PER_M = 1.0
 """No road vehicle turns within a radius of a metre."""
 _STRAIGHT_PER_M = 1e-12
-"""A bend of less is a straight: its radius may be no number any more."""
+"""Smaller curvatures count as straight: their radius may not be a number."""
 _FAR_M = 1e6
-"""The straights before the first leg and after the last one are as good as endless."""
+"""Length of the straights before the first leg and after the last one, practically endless."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Route:
 
     @cached_property
     def _legs(self) -> tuple["_PlacedLeg", ...]:
-        """The legs where they lie, with the straights before and after them."""
+        """Return the placed legs, with the straights before and after them."""
         poses, begins = [self.start], [0.0]
         for length, curvature in self.legs:
             poses.append(_after(poses[-1], length, curvature))
@@ -112,8 +112,8 @@ class _PlacedLeg:
 
 
 def _along_arc(x: Floats, y: Floats, length: Floats, curvature: Floats) -> Floats:
-    """How far along an arc that starts at the origin along x its foot of a point (x, y) is; below 0
-    or above `length` where an end is nearer.
+    """Return the place of a point's foot on an arc that starts at the origin along x. The result is
+    below 0 or above `length` where an end is nearer.
     """
     # Seen from the centre of the circle, a point's direction says how far along the arc its foot
     # is. Half a circle either way of the middle: beyond it the other end is nearer.
@@ -125,7 +125,7 @@ def _along_arc(x: Floats, y: Floats, length: Floats, curvature: Floats) -> Float
 
 
 def _chord(along: Floats | float, curvature: Floats | float) -> tuple[Floats, Floats]:
-    """Where an arc that starts at the origin along x is after `along` metres."""
+    """Return the point `along` metres down an arc that starts at the origin along x."""
     # NumPy's sinc(x) is sin(pi x) / (pi x) and 1 at 0, where the arc is straight.
     half = np.asarray(along) * curvature / 2
     chord = along * np.sinc(half / np.pi)
@@ -140,10 +140,8 @@ def _after(start: Pose, along: float, curvature: float) -> Pose:
 
 
 def through(points: Sequence[tuple[float, float]], radius_m: float) -> Route:
-    """The route along straight lines through `points` (at least two), each corner rounded by an arc
-    of `radius_m`.
-
-    Raises InvalidInput where the arcs of two corners would overlap.
+    """Return the route along straight lines through `points` (at least two), with corners rounded
+    to `radius_m`. Raises InvalidInput where the arcs of two corners would overlap.
     """
     corners = np.asarray(points, float)
     steps = np.diff(corners, axis=0)
@@ -204,8 +202,9 @@ hard lacks more after one keyframe."""
 
 @dataclass(frozen=True)
 class SpeedPlan:
-    """At most `cruise_mps`, and through a bend at most what keeps the sideways acceleration at
-    `sideways_mps2`. Before a bend the car slows at `comfort_mps2`, after it gains speed alike.
+    """Planned speed: at most `cruise_mps`, and in a bend at most `sideways_mps2` of sideways
+    acceleration. The car slows before a bend at `comfort_mps2` and accelerates after it at the same
+    rate.
     """
 
     route: Route
@@ -214,13 +213,13 @@ class SpeedPlan:
     comfort_mps2: float
 
     def at(self, s: float) -> float:
-        """m/s that the car means to have at `s` metres along the route."""
+        """Return the planned speed at `s` metres along the route, m/s."""
         return float(np.interp(s, self._places, self._speeds))
 
     def seconds_to(self, here: float, there: float, speed: float, gaining: float) -> float:
-        """Seconds from `here` to `there` for a car that has `speed` m/s now and goes on gaining
-        speed by `gaining` m/s^2, 0 or more, where the plan allows it; one that goes as planned goes
-        on as planned. 0 where it is past, inf for a car that stands and stays.
+        """Return the seconds from `here` to `there` for a car at `speed` m/s. The car gains speed
+        by `gaining` m/s^2, 0 or more, where the plan allows it. A car at planned speed keeps to the
+        plan. Returns 0 past `there`, inf for a car that stays at rest.
         """
         if there <= here:
             return 0.0
@@ -233,7 +232,9 @@ class SpeedPlan:
         return float(np.sum(_seconds_between(places, np.minimum(planned, gained))))
 
     def times(self, places: Floats) -> Floats:
-        """(n,) seconds from the first of `places` (n,), ascending, to each, driven as planned."""
+        """Return (n,) the seconds from the first of the ascending `places` (n,) to each, driven as
+        planned.
+        """
         speeds = np.interp(places, self._places, self._speeds)
         return np.concatenate([[0.0], np.cumsum(_seconds_between(places, speeds))])
 

@@ -20,18 +20,17 @@ if TYPE_CHECKING:
 
 _ROAD_LENGTH_M = 1000.0
 MAX_STEERING = np.deg2rad(35.0)
-"""Lock of a passenger car's front wheels. highway-env allows 60 degrees, at which a car slides out
+"""Largest steering angle of a passenger car. highway-env allows 60 degrees, at which a car slides
 sideways.
 """
 _NEAR_LANE_M = 1.0
-"""What highway-env adds to either side of a lane to find who drives ahead in it."""
+"""Margin that highway-env adds to either side of a lane when it looks for vehicles ahead."""
 
 
 class LaneKeeper(NamedTuple):
-    """A vehicle that goes straight along x in the middle of its lane: `x`, speed, the speed that an
-    IDM driver wants there, and of the lane its middle y, where it starts, and how far to either
-    side of its middle highway-env counts who is near it as in it. Metres and m/s, highway-env's
-    axes.
+    """A vehicle that goes straight along x in the middle of its lane: `x`, speed and an IDM
+    driver's wanted speed. Of the lane: its middle y, its start, and the half width within which
+    highway-env counts vehicles as in the lane. Metres and m/s, highway-env's axes.
     """
 
     x: float
@@ -74,16 +73,15 @@ class Traffic:
         self._ego_lane = ego_lane
 
     def add_ego(self, x: float, speed: float, kind: BodyKind) -> "RoadVehicle":
-        """The car with the sensors, in lane 0 at `x`; `RoadVehicle.accelerate` drives it."""
+        """Add the car with the sensors, in lane 0 at `x`; `RoadVehicle.accelerate` drives it."""
         ego = self._make(x, 0, speed, kind, decides=False)
         ego.enter()
         ego.forget_lane()
         return ego
 
     def add_driver(self, x: float, lane: int, speed: float, kind: BodyKind) -> "RoadVehicle":
-        """A vehicle that keeps its lane and follows the intelligent driver model (IDM).
-
-        It drives at `speed` m/s, and wants to.
+        """Add a vehicle that keeps its lane and follows the intelligent driver model (IDM). It
+        drives and wants `speed` m/s.
         """
         vehicle = self._make(x, lane, speed, kind)
         vehicle.enter()
@@ -92,9 +90,7 @@ class Traffic:
     def add_parked_driver(
         self, x: float, lane: int, kind: BodyKind, target_speed: float
     ) -> "RoadVehicle":
-        """An IDM driver who stands in `lane` until told to `pull_out`, and then wants
-        `target_speed`.
-        """
+        """Add an IDM driver who stands in `lane` until `pull_out`, then wants `target_speed`."""
         vehicle = self._make(x, lane, target_speed, kind)
         vehicle.stand()
         return vehicle
@@ -106,8 +102,8 @@ class Traffic:
         key = self.lane_key(lane)
         road_lane = self._road.network.get_lane(key)
         ahead = STANDING_GAP_M * (1 if road_lane.end[0] > road_lane.start[0] else -1)
-        # Drivers stop this gap before what stands ahead, so the obstacle stands beyond the line. It
-        # is there for them alone: nothing can hit it.
+        # Drivers stop this gap before an obstacle, so the obstacle stands beyond the line. Only
+        # drivers see it: nothing can hit it.
         obstacle = Obstacle(self._road, (x + ahead, road_lane.start[1]))
         obstacle.check_collisions = obstacle.collidable = False
         self._road.objects.append(obstacle)
@@ -123,8 +119,8 @@ class Traffic:
     def lane_keepers(
         self, vehicles: "Sequence[RoadVehicle]", seconds: float
     ) -> list[LaneKeeper] | None:
-        """Return what moves `vehicles`, if they are all that is on the road, in the order in which
-        they came there, and can do nothing for `seconds` but keep their lanes along x. Else None.
+        """Return the lane keepers of `vehicles`, or None. The vehicles must be all on the road, in
+        the order in which they joined it, and unable to leave their lanes along x for `seconds`.
         """
         found = [vehicle.keeping_lane(seconds) for vehicle in vehicles]
         keepers = [keeper for keeper in found if keeper is not None]
@@ -182,7 +178,7 @@ class RoadVehicle:
 
     @property
     def yaw_rate(self) -> float:
-        """rad/s: 0, since what asks for it, the ego, drives straight ahead."""
+        """Yaw rate in rad/s: 0, since only the ego reads it, which drives straight ahead."""
         return 0.0
 
     def is_of(self, vehicle: "Vehicle") -> bool:
@@ -190,13 +186,13 @@ class RoadVehicle:
         return self._vehicle is vehicle
 
     def keeping_lane(self, seconds: float) -> LaneKeeper | None:
-        """Return what moves it if it can do nothing for `seconds` but keep its lane, else None."""
+        """Return its lane keeper if it cannot leave its lane for `seconds`, else None."""
         from care_sim.world.lane_driver import not_zero
 
         vehicle, lane = self._vehicle, self._vehicle.lane
         x, speed = float(vehicle.position[0]), float(vehicle.speed)
-        # A driver looks for another lane 2.5 m before the end of its own. Who is faster than any
-        # vehicle may be becomes slower.
+        # A driver looks for another lane 2.5 m before the end of its own. highway-env slows
+        # vehicles above its speed limit.
         way = max(abs(speed), vehicle.MAX_SPEED + 1.0) * seconds
         stays = abs(x) + way < _ROAD_LENGTH_M - lane.VEHICLE_LENGTH
         # Drivers alone have a lane that they want to be in.
@@ -214,7 +210,7 @@ class RoadVehicle:
         self._traffic.join(self._vehicle)
 
     def forget_lane(self) -> None:
-        """Never again look up the nearest lane: only drivers ask which one they are in."""
+        """Stop looking up the nearest lane, which only drivers need."""
         self._vehicle.road = None
 
     def put(self, x: float, speed: float) -> None:
@@ -230,7 +226,7 @@ class RoadVehicle:
         """Hold an acceleration (m/s^2) for the next step of `dt` seconds; a car at rest does not
         reverse.
         """
-        # No more than what brings it to rest within the step: braking further would be reversing.
+        # Brake at most to rest within the step: more would reverse.
         held = max(acceleration, -self.speed / dt)
         self._vehicle.act({"acceleration": held, "steering": 0.0})
 

@@ -1,4 +1,4 @@
-"""The world of one episode: every body, who moves it, and what the scoring reads off it."""
+"""The world of one episode: bodies, their motions, and the truth that the scoring reads."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ from care_sim.world.route import Route, RouteCar, SpeedPlan
 from care_sim.world.traffic import RoadVehicle, Traffic
 
 WORLD_STEP_S = 0.05
-"""Half a keyframe of the closed loop: nobody here moves further than 0.5 m in it."""
+"""Half a keyframe of the closed loop, in which nothing moves more than 0.5 m."""
 
 Motion = Callable[[float], Pose]
 """The pose of a body at a time in seconds."""
@@ -31,8 +31,8 @@ Motion = Callable[[float], Pose]
 
 @dataclass(frozen=True)
 class Actor:
-    """A body with a pose at any time. `reported` says whether perception knows its class, and
-    `moved_by` is what its pose comes from: one pose, a function of time, or a vehicle.
+    """A body with a pose at any time. `reported` is True if perception knows its class. `moved_by`
+    gives its pose: one pose, a function of time, or a vehicle.
     """
 
     name: str
@@ -57,52 +57,52 @@ class Reflection:
     def __call__(self, time: float) -> Pose:
         """The pose at `time`."""
         pose = self.of.pose if isinstance(self.of, RoadVehicle) else self.of(time)
-        return on_the_other_side(pose)
+        return reflect_pose(pose)
 
 
-def on_the_other_side(pose: Pose) -> Pose:
+def reflect_pose(pose: Pose) -> Pose:
     """A pose reflected at the x axis."""
     x, y, heading = pose
     return x, -y, -heading
 
 
 def source_of(moved_by: Pose | Motion | RoadVehicle) -> Pose | Motion | RoadVehicle:
-    """What moves an actor, on either side of the street."""
+    """Return the motion of an actor, on either side of the street."""
     return moved_by.of if isinstance(moved_by, Reflection) else moved_by
 
 
 class World:
-    """Bodies in PyBullet, moved by highway-env, walks and events. Built by a scenario.
+    """Bodies in PyBullet, moved by highway-env, walks and events. A scenario builds it.
 
-    World frame: x along the road, y left, z up; the ego starts with its centre at the origin and
-    drives along x, or at the start of its `route` and along that.
+    World frame: x along the road, y left, z up. The ego starts with its centre at the origin and
+    drives along x. With a `route` it starts at the route's start and follows it.
     """
 
     scene: str
-    """What messages call the world; the scenario that built it."""
+    """Name of the world in messages: the scenario that built it."""
     time: float
     """Seconds from the start."""
     actors: list[Actor]
     """All bodies but the ego, in the order in which they were added."""
     first_sighting: Actor | None
-    """The actor whom the episode is about; its scenario sets it."""
+    """The first-sighting actor of the episode; its scenario sets it."""
     route: Route | None
-    """The way that the ego is to go, as its navigation knows it; None is straight ahead."""
+    """The ego's route, as its navigation knows it; None is straight ahead."""
     speed_plan: SpeedPlan | None
-    """How fast it means to go there; None is as fast as it starts. Its scenario sets it."""
+    """Planned speed on the route; None keeps the initial speed. Its scenario sets it."""
     goal_m: float
-    """Where on its way the ego has arrived; its scenario may set it."""
+    """Place of the goal on the ego's way; its scenario may set it."""
     ended: "Callable[[World], bool]"
-    """The rule by which nothing can happen any more that the episode is about: the ego has arrived,
-    unless its scenario sets another. Like all that a world calls, it is handed the world and does
-    not hold it: a world that holds itself keeps its client of PyBullet until garbage is collected.
+    """Rule that ends the episode's event: the ego has arrived, unless its scenario sets another
+    rule. It takes the world as its argument and does not hold it, like all functions that a world
+    calls. A world that holds itself keeps its PyBullet client until garbage is collected.
     """
     has_oncoming: bool
-    """Whether somebody may come towards the ego into its way, so that its brake has to foresee it;
-    its scenario sets it.
+    """True if oncoming actors may enter the ego's way, so that its brake must foresee them; its
+    scenario sets it.
     """
     meetings: list[Meeting]
-    """Whom the scenario lets the ego meet, in the order of the way."""
+    """Planned meetings of the ego, in the order of the way."""
     drawn: Mapping[str, float | str]
     """Parameters of the scenario that the seed drew, by name; its scenario sets them. For scoring:
     they are truth.
@@ -125,7 +125,7 @@ class World:
         self.ego_body = self.bullet.add(self.ego_kind, self.ego.pose, transparent=True)
         self._footprints = Footprints()
         self._footprints.add(self.ego_body, self.ego_kind.size, self.ego.pose)
-        # Until the first step nothing has moved: there are no others.
+        # Before the first step nothing has moved.
         self._before = self._footprints.boxes
         self.first_sighting = None
         self.speed_plan = None
@@ -153,13 +153,12 @@ class World:
         backdrop: bool = False,
     ) -> Actor:
         """Add a body that stands at a pose, follows a function of time, or drives in the traffic.
-
-        Its kind is one of the catalogue, by name, or any other. `reported=False` keeps perception
-        silent about it, whatever its kind. A `backdrop` stands behind all that perception reports,
-        so that the camera need not render it. Raises InvalidInput for an unknown name, and for a
-        pose that is not finite.
+        Its kind is a name of the catalogue, or any `BodyKind`. With `reported=False` perception
+        never reports it. A `backdrop` stands behind everything that perception reports, so the
+        camera need not render it. Raises InvalidInput for an unknown name, and for a pose that is
+        not finite.
         """
-        # Only what may move is asked for its pose at every step.
+        # Only movable bodies are asked for their pose at every step.
         pose_at = _motion(pose)
         place = pose_at(self.time)
         self._check_pose(name, place)
@@ -192,11 +191,11 @@ class World:
 
     @property
     def scripted(self) -> bool:
-        """Whether something is called while it moves: events, or looks at every step."""
+        """Whether the world calls functions while it moves: events, or at every step."""
         return bool(self._events or self._every_step)
 
     def is_over(self) -> bool:
-        """Whether nothing can happen any more that the episode is about."""
+        """Return True if the episode's event is over."""
         return self.ended(self)
 
     @property
@@ -232,14 +231,16 @@ class World:
         return self._kinds
 
     def velocities_of(self, bodies: Integers) -> Floats:
-        """(n, 2) velocities of bodies (n,) in the world frame, m/s, over the last world step."""
+        """Return (n, 2) velocities of bodies (n,) in the world frame, m/s, over the last world
+        step.
+        """
         moved = self._footprints.boxes[bodies, :2] - self._before[bodies, :2]
         return np.asarray(moved / WORLD_STEP_S)
 
     def linear_motion(self) -> LinearMotion:
-        """How everything moved over the last world step; before the first, all stands."""
+        """Return how everything moved over the last world step; before the first, all stands."""
         places = [0, 1, 6]
-        # Where there is no body is no place, and nothing that moves.
+        # Rows without a body have no place and no motion.
         rates = rates_between(
             self._before[:, places], self._footprints.boxes[:, places], WORLD_STEP_S
         )
@@ -270,10 +271,10 @@ class World:
         return ClosestApproach(float(nearest_m[0]), clearances.least(0, 1, steps + 1), impact)
 
     def step(self, acceleration: float) -> None:
-        """Move everything by a world step, as `advance` does, and look at nothing. Raises
+        """Move everything by a world step, as `advance` does, without clearances. Raises
         InvalidInput for a pose that is not finite.
         """
-        # The traffic moves first, the ego in it, then the clock; events are of the new time.
+        # The traffic moves first, with the ego, then the clock. Events use the new time.
         before = self.ego.speed
         self.ego.accelerate(acceleration, WORLD_STEP_S)
         self.traffic.step(WORLD_STEP_S)
@@ -281,8 +282,8 @@ class World:
         self._steps += 1
         self.time = round(self._steps * WORLD_STEP_S, 9)
 
-        # Events that are due are taken off the list before any is called: one may start another,
-        # which has its turn at the next step if it is due already.
+        # Due events leave the list before any is called. An event may add another, which runs at
+        # the next step if it is due already.
         if self._events:
             due = [event for start, event in self._events if start <= self.time]
             self._events = [(start, event) for start, event in self._events if start > self.time]
@@ -305,13 +306,13 @@ class World:
                 self._check_pose(name, pose)
 
     def hand_over(self) -> None:
-        """Let other code move the world, by `put`, which calls no events."""
+        """Let other code move the world by `put`, which calls no events."""
         self._is_handed_over = True
 
     def put(
         self, steps: int, boxes: Floats, before: Floats, motion: Ego, lanes: Mapping[int, Floats]
     ) -> None:
-        """Put everything where it is after so many world steps, if other code has moved it.
+        """Store the state of everything after this many world steps that other code has computed.
 
         `boxes` and `before` (m, 7) are those of all bodies now and a world step ago, `motion` the
         ego's. `lanes` holds x and speed of every vehicle by its body.

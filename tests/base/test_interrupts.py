@@ -36,7 +36,7 @@ class Interrupted:
         os.kill(os.getpid(), signal.SIGINT)
         sum(range(1000))
 
-interrupts.raise_them()
+interrupts.raise_interrupts()
 try:
     Interrupted()
     time.sleep(60)
@@ -79,7 +79,7 @@ class Interrupts(MetaPathFinder):
             sum(range(1000))
         print("deaf")
 
-interrupts.raise_them()
+interrupts.raise_interrupts()
 sys.meta_path.insert(0, Interrupts())
 try:
     import colorsys
@@ -111,7 +111,7 @@ def test_an_interrupt_finds_all_handlers_changed_or_none(moment, monkeypatch):
 
     monkeypatch.setattr(signal, "signal", interrupted)
     try:
-        with interrupts.held_back():
+        with interrupts.hold_interrupts():
             assert not heard
         assert (len(changes), heard) == (4, [1])
         assert {number: signal.getsignal(number) for number in kept} == ours
@@ -134,7 +134,7 @@ def test_what_is_ignored_stays_ignored():
     """As under nohup."""
     program = (
         "import signal; from care_sim.base import interrupts; "
-        "interrupts.raise_them(); print(signal.getsignal(1))"
+        "interrupts.raise_interrupts(); print(signal.getsignal(1))"
     )
     ignoring = f"import signal; signal.signal(1, signal.SIG_IGN)\n{program}"
     with Marked([sys.executable, "-c", ignoring]) as started:

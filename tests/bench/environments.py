@@ -13,7 +13,7 @@ from gymnasium import spaces
 from gymnasium.utils.performance import benchmark_init, benchmark_step, benchmark_vector_step
 from gymnasium.vector import AsyncVectorEnv
 
-from care_sim.base.extras import silenced
+from care_sim.base.extras import silence_output
 from care_sim.base.processes import following, starting
 from care_sim.core.conditions import DEFAULTS
 from care_sim.envs import ENVIRONMENT_IDS
@@ -110,7 +110,7 @@ def speed(maker, settings):
     """Figures of one environment: `steps_per_s`, resets included; `steps_per_cpu_s`, steps per
     second that this process itself had the core; `inits_per_s`, constructions with a reset.
     """
-    with silenced(STANDARD_OUTPUT):
+    with silence_output(STANDARD_OUTPUT):
         with maker() as env:
             started, worked = time.perf_counter(), time.process_time()
             steps = benchmark_step(env, settings.seconds, EPISODE.seed)

@@ -77,7 +77,7 @@ def annotated(
     }
 
 
-def as_recorded(points):
+def add_recorded_losses(points):
     """Rows of a sweep file for points (n, 3) in the car's frame."""
     w, x, y, z = LIDAR[1]
     own = Rotation.from_quat([x, y, z, w]).inv().apply(np.asarray(points) - LIDAR[0])

@@ -3,7 +3,7 @@
 import numpy as np
 
 from care_sim.core.frames import Frame, turned
-from tests.helpers.nuscenes_database import annotated, as_recorded, pose, write
+from tests.helpers.nuscenes_database import add_recorded_losses, annotated, pose, write
 
 SPLIT = {"scene-0103": 0.0, "scene-0916": 2.2}
 """The heading of each drive; both are scenes of the official validation split."""
@@ -59,7 +59,7 @@ def sample(heading, number, rng):
     return (
         boxes,
         pose(x, y, heading),
-        as_recorded(car.vectors_to_local(np.concatenate(points) - car.origin)),
+        add_recorded_losses(car.vectors_to_local(np.concatenate(points) - car.origin)),
     )
 
 

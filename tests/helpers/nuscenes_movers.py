@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from care_sim.core.frames import Frame, turned
 from care_sim.core.types import CLASSES
 from care_sim.sources.nuscenes.recordings import OFFICIAL
-from tests.helpers.nuscenes_database import SENSORS, annotated, as_recorded, pose
+from tests.helpers.nuscenes_database import SENSORS, add_recorded_losses, annotated, pose
 from tests.helpers.nuscenes_drive import CATEGORIES, SIZES
 from tests.helpers.nuscenes_sweeps import write_swept
 
@@ -96,7 +96,7 @@ def _sweep(rng, heading, objects, time_s):
     points = []
     for number, ((name, *_), spot) in enumerate(zip(objects, spots, strict=True)):
         world = np.array([*spot, 1.0]) + rng.uniform(-SPREAD_M, SPREAD_M, (POINTS, 3))
-        rows = as_recorded(car.vectors_to_local(world - car.origin))
+        rows = add_recorded_losses(car.vectors_to_local(world - car.origin))
         rows[:, 3] = 20 * number + CLASSES.index(name)
         points.append(rows)
     return pose(x, y, heading), spots, np.concatenate(points)

@@ -5,7 +5,7 @@ import numpy as np
 from care_sim.sources.nuscenes.films import nuscenes_film
 from care_sim.sources.nuscenes.recordings import split_scenes
 from care_sim.sources.nuscenes.tables import Database
-from tests.helpers.nuscenes_database import annotated, as_recorded, pose, write
+from tests.helpers.nuscenes_database import add_recorded_losses, annotated, pose, write
 
 SCENE = "scene-0103"
 CAR = annotated("vehicle.car", (20.0, 2.0, 0.85), instance="a")
@@ -18,7 +18,7 @@ own roof.
 
 
 def database(folder, samples=None):
-    samples = samples or [([CAR], pose(), as_recorded(WORLD))]
+    samples = samples or [([CAR], pose(), add_recorded_losses(WORLD))]
     return write(folder / "nuscenes", {SCENE: samples})
 
 

@@ -91,7 +91,7 @@ def test_a_change_of_any_file_that_it_reads_makes_it_anew(tmp_path):
         return detector
 
     def kept():
-        return lifetimes.kept_or_made(Shared, {"file": folder}, made, [declared])
+        return lifetimes.get_or_make(Shared, {"file": folder}, made, [declared])
 
     for file in (folder / "w", declared, base):
         first = kept()

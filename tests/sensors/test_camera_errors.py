@@ -22,8 +22,8 @@ from care_sim.sensors.camera_errors import (
     UNHIDDEN,
     Ghosts,
     PersistentDraws,
-    confused,
-    jittered,
+    confuse_classes,
+    jitter_boxes,
     seen_as,
     whole_boxes,
 )
@@ -39,7 +39,7 @@ SPREADS = (0.1, 0.02, 0.15, 0.05)
 def errors(boxes, draws, spreads=SPREADS):
     boxes, draws = np.asarray(boxes, float), np.asarray(draws, float)
     zeros = np.zeros(len(boxes), np.int64)
-    return jittered(boxes, draws, np.tile(spreads, (len(boxes), 1)), zeros, [FRONT_CAMERA])
+    return jitter_boxes(boxes, draws, np.tile(spreads, (len(boxes), 1)), zeros, [FRONT_CAMERA])
 
 
 def test_one_sigma_moves_and_stretches_by_the_spread():
@@ -71,13 +71,15 @@ MATRIX = YOLOX.confusion_matrix()
 @pytest.mark.parametrize("true", range(len(CLASSES)))
 def test_classes_are_reported_as_often_as_the_matrix_says(true):
     draws = (np.arange(1000) + 0.5) / 1000
-    reported = confused(np.full(1000, true), draws, MATRIX)
+    reported = confuse_classes(np.full(1000, true), draws, MATRIX)
     assert np.bincount(reported, minlength=5) / 1000 == pytest.approx(MATRIX[true])
 
 
 def test_a_draw_below_one_always_has_a_class():
     thirds = np.full((3, 3), 1 / 3)
-    assert confused(np.array([0]), np.array([np.nextafter(1.0, 0.0)]), thirds).tolist() == [2]
+    assert confuse_classes(np.array([0]), np.array([np.nextafter(1.0, 0.0)]), thirds).tolist() == [
+        2
+    ]
 
 
 TABLE = RecallTable((10.0, 30.0), (0.5, 1.0), ((0.2, 0.4), (0.6, 0.8)))

@@ -227,7 +227,7 @@ def silent(cells):
 
 @pytest.mark.parametrize("rate", [0.0, 0.02, 0.5, 1.0])
 def test_a_share_of_the_cells_has_a_ghost(grid, rate):
-    scan, bodies = crosstalk(grid, rate).over_scan(*silent(np.arange(grid.size)))
+    scan, bodies = crosstalk(grid, rate).add_to_scan(*silent(np.arange(grid.size)))
     ghosts = np.isfinite(scan.ranges)
     assert ghosts.mean() == pytest.approx(rate, abs=0.015)
     assert np.array_equal(scan.intensities, ghosts)
@@ -235,7 +235,7 @@ def test_a_share_of_the_cells_has_a_ghost(grid, rate):
 
 
 def test_ghosts_are_anywhere_within_reach(grid):
-    scan, _ = crosstalk(grid, 1.0).over_scan(*silent(np.arange(grid.size)))
+    scan, _ = crosstalk(grid, 1.0).add_to_scan(*silent(np.arange(grid.size)))
     counts, _ = np.histogram(scan.ranges, bins=10, range=(0, grid.range_m))
     assert 0 < scan.ranges.min() < scan.ranges.max() < grid.range_m
     assert counts == pytest.approx(np.full(10, grid.size / 10), rel=0.1)
@@ -246,8 +246,8 @@ def test_ghosts_change_from_keyframe_to_keyframe_and_not_with_what_fires(grid):
     cells = np.arange(0, grid.size, 5)
     keyframes = []
     for _ in range(3):
-        full, _ = one.over_scan(*silent(np.arange(grid.size)))
-        part, _ = other.over_scan(*silent(cells))
+        full, _ = one.add_to_scan(*silent(np.arange(grid.size)))
+        part, _ = other.add_to_scan(*silent(cells))
         assert np.array_equal(part.ranges, full.ranges[cells])
         keyframes.append(np.isfinite(full.ranges))
     assert 0.4 < (keyframes[0] == keyframes[1]).mean() < 0.7
@@ -258,8 +258,8 @@ def test_recorded_clouds_have_the_same_ghosts(grid):
     cells = np.arange(0, grid.size, 2)
     cloud = Cloud(cells, grid.directions[cells] * 7.0, np.zeros(len(cells), np.int64))
     answering = np.arange(grid.size) % 3 == 0
-    haunted = crosstalk(grid, 0.3).over_cloud(cloud.take(answering[cells]), answering)
-    scan, _ = crosstalk(grid, 0.3).over_scan(*silent(np.arange(grid.size)))
+    haunted = crosstalk(grid, 0.3).add_to_cloud(cloud.take(answering[cells]), answering)
+    scan, _ = crosstalk(grid, 0.3).add_to_scan(*silent(np.arange(grid.size)))
     ghosts = np.isfinite(scan.ranges) & answering
     assert (np.diff(haunted.cells) > 0).all()
     assert np.array_equal(haunted.cells[haunted.objects == NO_OBJECT], np.flatnonzero(ghosts))
@@ -291,10 +291,12 @@ def test_ghosts_have_a_stream_of_their_own(grid):
     sensing = Sensing(lidar_crosstalk=0.3, lidar_dropout=0.3)
     nothing = silent(np.arange(grid.size))
     seed = np.random.SeedSequence(4)
-    noise = Crosstalk(grid, sensing, np.random.SeedSequence(4)).over_scan(*nothing)[0]
-    dropout = Crosstalk(grid, sensing, np.random.SeedSequence(4).spawn(1)[0]).over_scan(*nothing)[0]
+    noise = Crosstalk(grid, sensing, np.random.SeedSequence(4)).add_to_scan(*nothing)[0]
+    dropout = Crosstalk(grid, sensing, np.random.SeedSequence(4).spawn(1)[0]).add_to_scan(*nothing)[
+        0
+    ]
     CellFaults(grid, sensing, seed)
-    own = crosstalk_of(grid, sensing, seed).over_scan(*nothing)[0]
+    own = crosstalk_of(grid, sensing, seed).add_to_scan(*nothing)[0]
     for other in (noise, dropout):
         both = np.isfinite(own.ranges) & np.isfinite(other.ranges)
         assert both.mean() == pytest.approx(0.09, abs=0.01)

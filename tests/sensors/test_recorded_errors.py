@@ -6,7 +6,7 @@ import pytest
 from care_sim.core.grid import AngularGrid
 from care_sim.core.types import CLASSES
 from care_sim.sensors.annotated import NO_OBJECT, Cloud
-from care_sim.sensors.recorded_errors import MOST_SIGMAS, PASSED, SLOPE, as_recorded, slopes
+from care_sim.sensors.recorded_errors import MOST_SIGMAS, PASSED, SLOPE, add_recorded_losses, slopes
 
 GRID = AngularGrid()
 NOBODY = np.empty(0, np.int64), np.empty(0)
@@ -24,7 +24,7 @@ def nothing(cells):
 
 
 def worn(cloud, objects=NOBODY, behind=nothing):
-    return as_recorded(cloud, GRID, objects, behind, np.random.default_rng(0))
+    return add_recorded_losses(cloud, GRID, objects, behind, np.random.default_rng(0))
 
 
 @pytest.mark.parametrize(("range_m", "lost"), [(8.0, 0.02), (18.5, 0.075), (40.0, 0.13)])

@@ -185,11 +185,11 @@ def test_faults_keep_to_the_reach_of_each_lidar():
 
     jammed = Crosstalk(STACK, ReturnSettings(lidar_crosstalk=1.0), np.random.SeedSequence(0))
     nothing = Scan(EVERY_CELL, np.full(STACK.size, np.inf))
-    ghosts, _ = jammed.over_scan(nothing, np.full(STACK.size, NO_BODY))
+    ghosts, _ = jammed.add_to_scan(nothing, np.full(STACK.size, NO_BODY))
     assert 40.0 < ghosts.ranges[:512].max() < 50.0
     assert 70.0 < ghosts.ranges[512:].max() < 80.0
     empty = Cloud(EVERY_CELL[:0], np.empty((0, 3)), EVERY_CELL[:0])
-    cloud = jammed.over_cloud(empty, np.ones(STACK.size, bool))
+    cloud = jammed.add_to_cloud(empty, np.ones(STACK.size, bool))
     found = STACK.ranges_to(cloud.cells, cloud.points)
     assert (found[cloud.cells < 512] < 50.0).all()
     assert found[cloud.cells >= 512].max() > 60.0

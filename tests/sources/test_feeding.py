@@ -82,12 +82,12 @@ def test_each_of_several_detectors_is_judged_on_its_own_sweeps(recording):
 
 def test_a_source_without_sweeps_says_so_once(capsys, tmp_path):
     report_once.cache_clear()
-    line = f"holds no sweeps between its keyframes: detector {NAME} gets 1 per keyframe, and asks"
+    line = f"holds no sweeps between its keyframes: detector {NAME} gets 1 per keyframe, and wants"
     for kind in ("streets", f"nuscenes:{swept(tmp_path)}"):
         options = Protocol(source=kind, detector=NAME, split=None if kind == "streets" else "all")
         for _ in range(2):
             source = source_named(options, kind)
-        assert capsys.readouterr().err == f"care-sim: {kind.partition(':')[0]} {line} for 10\n"
+        assert capsys.readouterr().err == f"care-sim: {kind.partition(':')[0]} {line} 10\n"
         assert (
             play_grid(source, source.scenes()[:1], ["care"], [0.1])[0].row().get("sweeps") is None
         )

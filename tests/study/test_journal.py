@@ -15,7 +15,7 @@ from care_sim.commands.shared.run_study import run_study
 from care_sim.reports.report import next_steps, read_results
 from care_sim.reports.studies import SWEEP
 from care_sim.study.episode_config import grid
-from care_sim.study.journal import JOURNAL, UNFINISHED, Journal, _checksum, how_far
+from care_sim.study.journal import JOURNAL, UNFINISHED, Journal, _checksum, describe_progress
 
 HOLDS_AND_DIES = """
 import os, signal, sys
@@ -161,7 +161,7 @@ def stopped(configs, played, folder, command, monkeypatch):
 
 
 def test_a_folder_tells_how_far_its_study_is_and_how_to_go_on(tmp_path, monkeypatch):
-    assert how_far(tmp_path) == ""
+    assert describe_progress(tmp_path) == ""
     configs, command = short(range(3)), "care-sim sweep --seeds 3"
     stopped(configs, 2, tmp_path, command, monkeypatch)
     told = f"{tmp_path} holds an unfinished study, sweep: 2 of 3 episodes are played"
@@ -169,12 +169,12 @@ def test_a_folder_tells_how_far_its_study_is_and_how_to_go_on(tmp_path, monkeypa
         read_results(tmp_path)
     assert str(refused.value) == f"{told}; to go on: {command}"
     with Journal(tmp_path / JOURNAL):
-        assert how_far(tmp_path) == f"{told}, and it is being played now"
+        assert describe_progress(tmp_path) == f"{told}, and it is being played now"
     # A note that is lost or damaged.
     note = (tmp_path / UNFINISHED).read_text()
     for text in ("{", "[]", '{"study": 3}', note.replace('"others": 0', '"others": "0"')):
         (tmp_path / UNFINISHED).write_text(text)
-        assert how_far(tmp_path) == (
+        assert describe_progress(tmp_path) == (
             f"{tmp_path} holds an unfinished study, 2 rows; run again the command that began it"
         )
     assert run_study(configs, tmp_path, workers=1) == []
@@ -184,7 +184,7 @@ def test_a_folder_tells_how_far_its_study_is_and_how_to_go_on(tmp_path, monkeypa
 def test_rows_of_other_options_do_not_count(tmp_path, monkeypatch):
     run_study(short((7,)), tmp_path, workers=1)
     stopped(short((7, 8, 9)), 2, tmp_path, "again", monkeypatch)
-    assert "2 of 3 episodes are played; to go on: again" in how_far(tmp_path)
+    assert "2 of 3 episodes are played; to go on: again" in describe_progress(tmp_path)
     # Results of before are shown, with a line that not all is there.
     assert len(read_results(tmp_path)[0]) == 1
     (said,) = (one for one in next_steps(tmp_path, SWEEP) if one.startswith("Not all of it"))

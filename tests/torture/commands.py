@@ -98,7 +98,7 @@ def run(arguments, encoding="utf-8", interrupted_after=0.0, before=None, after=N
     """Play a command line in this process, between the calls `before` and `after`, and judge its
     ending.
     """
-    from care_sim.base.interrupts import raise_them
+    from care_sim.base.interrupts import raise_interrupts
     from care_sim.base.limits import check_at_start
     from care_sim.cli import main
 
@@ -107,7 +107,7 @@ def run(arguments, encoding="utf-8", interrupted_after=0.0, before=None, after=N
     try:
         if before:
             before()
-        raise_them()  # as the command does that has the process to itself
+        raise_interrupts()  # as the command does that has the process to itself
         signal.signal(signal.SIGALRM, signal.getsignal(signal.SIGINT))
         check_at_start()
         signal.setitimer(signal.ITIMER_REAL, interrupted_after or 0.0)

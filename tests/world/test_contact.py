@@ -14,7 +14,7 @@ from care_sim.world.body_tables import Footprints
 from care_sim.world.bullet import BulletWorld
 from care_sim.world.bullet_bodies import pybullet
 from care_sim.world.clearances import Clearances
-from care_sim.world.contact import PADDING_M, ClearanceJudge, judge_here, least_gap
+from care_sim.world.contact import PADDING_M, ClearanceJudge, borrow_judge, least_gap
 
 KINDS = ("pedestrian", "bicycle", "car", "bus", "trailer", "hoarding")
 BODIES = st.lists(
@@ -82,18 +82,18 @@ def ahead_by_ten(judge, kind):
 
 def test_worlds_of_a_thread_share_a_judge_and_threads_do_not():
     with ThreadPoolExecutor(1) as thread:
-        other = thread.submit(judge_here).result()
-        assert thread.submit(judge_here).result() is other
-    assert judge_here() is judge_here() is not other
+        other = thread.submit(borrow_judge).result()
+        assert thread.submit(borrow_judge).result() is other
+    assert borrow_judge() is borrow_judge() is not other
 
 
 @pytest.mark.parametrize("end", [pybullet.disconnect, pybullet.resetSimulation])
 def test_a_judge_whose_client_somebody_else_ends_is_replaced(end):
-    told = ahead_by_ten(judge_here(), CATALOGUE["car"])
-    lost = judge_here()
+    told = ahead_by_ten(borrow_judge(), CATALOGUE["car"])
+    lost = borrow_judge()
     end(physicsClientId=lost._client.number)
-    assert judge_here() is not lost
-    assert ahead_by_ten(judge_here(), CATALOGUE["car"]) == told
+    assert borrow_judge() is not lost
+    assert ahead_by_ten(borrow_judge(), CATALOGUE["car"]) == told
 
 
 PAIRED = ("adult", "bicycle", "car", "motorcycle", "pedestrian", "trailer", "truck", "van", "hedge")
@@ -106,7 +106,7 @@ class Pair:
     def __init__(self, kind):
         self.world = BulletWorld()
         self.footprints = Footprints()
-        self.judge = judge_here()
+        self.judge = borrow_judge()
         self.clearances = Clearances(1, 4)
         self.clearances.begin(0, (CATALOGUE["ego"], CATALOGUE[kind]))
         self.steps, self.asked = np.zeros(1, int), 0

@@ -51,7 +51,7 @@ class Benchmark(WorkerOptions):
     """In which order the cells of a set are taken, a part of the entry: the policy's own, or one of
     rows-down, rows-up, columns, random, spread, core-spread."""
     name: str = ""
-    """What you call the entry, for its line in tables, if one policy is played alone."""
+    """Name of the entry in tables, if a single policy is played."""
     detector: str = "centerpoint"
     """The detector. Published entries use centerpoint only."""
     closed_loop: Flag = False

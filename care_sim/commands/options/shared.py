@@ -57,9 +57,10 @@ class DetectorOptions:
     """Which detector looks at the points."""
 
     detector: str = "returns"
-    """returns (the paper's proxy), graded (the surer the more returns), centerpoint, megvii and
-    pointrcnn (as measured on real data), cluster (a real one), pillars (a learned one),
-    torchscript, the name of an installed one, or MODULE:CLASS."""
+    """Built in: returns (the paper's proxy), graded (confidence grows with returns), centerpoint,
+    megvii and pointrcnn (measured on real data), cluster (a real one), pillars (a learned one),
+    torchscript. Otherwise the name of an installed detector, or MODULE:CLASS.
+    """
     detector_parameters: tuple[str, ...] = ()
     """Parameters of the detector as NAME=VALUE, for example file=model.pt for torchscript."""
 
@@ -125,8 +126,8 @@ class SourceOptions(RecordingOptions):
     """For nuScenes: a file with the boxes of a camera detector, in nuScenes or COCO results
     form."""
     sweeps: int | None = None
-    """For nuScenes: sweeps per keyframe that a detector gets; without this option as many as the
-    detector asks for, mostly 1. 2 adds the sweep before, fired by the mask of the keyframe before.
+    """For nuScenes: sweeps per keyframe that a detector gets. The default is the detector's own
+    number, mostly 1. 2 adds the sweep before, fired by the mask of the keyframe before.
     """
     camera_times: str | None = None
     """For nuScenes: own (the default: each camera at the time of its picture) or sweep (all at the

@@ -64,8 +64,8 @@ class EitherLoopStudy(FixedStudy, SourceOptions):
     """With --source: shares of the cells that may fire at a keyframe, above 0 and at most 1."""
 
     def check_loop(self, closed: Collection[str], opened: Collection[str]) -> None:
-        """Raise InvalidInput for an option of the other loop: those named `closed` have no meaning
-        in the open loop, those of the source and those named `opened` none in the closed loop.
+        """Raise InvalidInput for an option of the other loop. Options in `closed` have no meaning
+        in the open loop. Options in `opened` and those of the source have none in the closed loop.
         """
         of_scenes = {"scenes", *(field.name for field in fields(SourceOptions)), *opened}
         foreign, word = (closed, "with") if self.source else (of_scenes, "without")

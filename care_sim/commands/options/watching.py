@@ -113,4 +113,4 @@ class List:
     kind: tyro.conf.Positional[
         Literal["policies", "agents", "scenarios", "sources", "detectors", "sensors", "engines"]
     ]
-    """What is listed."""
+    """The kind to list."""

@@ -17,8 +17,8 @@ def command_line(command: object) -> str:
     place = f"{type(command).__module__}:{type(command).__name__}"
     for name, each in COMMANDS.items():
         if place == f"care_sim.{each.options}":
-            # What is told by its place comes first: after an option that takes several values it
-            # would be one of them.
+            # Positional arguments come first: after an option with several values they would be
+            # read as such values.
             words = sorted(_words(command), key=lambda option: option[0].startswith("--"))
             return shlex.join(
                 ["care-sim", *name.split(), *(word for option in words for word in option)]

@@ -53,9 +53,9 @@ def check_folder(
     journal: Journal | Finished | None = None,
     force: bool = False,
 ) -> None:
-    """Raise InvalidInput where the study may not take the folder: where that holds results of the
-    other kind, episodes or plays, and unless `force` where results or the rows of a journal would
-    be lost. Raises as `read_rows` does where results are damaged.
+    """Raise InvalidInput where the study may not use the folder. That is where the folder holds
+    results of the other kind (episodes or plays), or, without `force`, where results or a journal's
+    rows would be lost. Raises as `read_rows` does where results are damaged.
     """
     # Each kind has files of its own, so that --force would leave both in one folder.
     kind = study.results
@@ -143,11 +143,16 @@ def _first(gone: Sequence[Row], configs: Sequence[RunConfig]) -> str:
     found = []
     for now in (asked_with(row) for row in (c.row() for c in configs) if row_label(row) == label):
         names = [name for name in sorted({*there, *now}) if there.get(name) != now.get(name)]
-        found.append([f"{name} {_told(name, there)}, now {_told(name, now)}" for name in names])
+        found.append(
+            [
+                f"{name} {_format_value(name, there)}, now {_format_value(name, now)}"
+                for name in names
+            ]
+        )
     nearest = min(found, key=len, default=[])
     return f"{label} ({'; '.join(nearest[:_MOST_TOLD])})" if nearest else label
 
 
-def _told(name: str, asked: Row) -> str:
+def _format_value(name: str, asked: Row) -> str:
     value = asked.get(name, USUAL.get(name))
     return "not given" if value is None else str(value)

@@ -17,7 +17,7 @@ from care_sim.core.conditions import DEFAULTS, OF_BOTH_LOOPS, ClosedLoopConditio
 from care_sim.reports.episodes.clips import Clip
 from care_sim.sensors.setups import DEFAULT_SETUP
 from care_sim.sources.feeding import source_for
-from care_sim.sources.installed import SOURCES, means_source
+from care_sim.sources.installed import SOURCES, is_source_place
 from care_sim.sources.named import source_name, source_of
 from care_sim.sources.recordings import Recordings
 from care_sim.sources.scenes import Scene, Source, Streets
@@ -34,7 +34,7 @@ def is_source(text: str) -> bool:
     if name in (_STREET, *SOURCES.names()):
         return True
     # A scenario's message fits whatever is no source or cannot be loaded.
-    return is_place(name) and means_source(name)
+    return is_place(name) and is_source_place(name)
 
 
 def maker_of(

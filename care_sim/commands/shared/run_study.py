@@ -49,9 +49,9 @@ def play_study(
     folder: str,
     left_out: Sequence[str] = (),
 ) -> int:
-    """Play the tasks of the study `name`, in runs/ under `folder` unless the options say otherwise,
-    and print their tables, the tasks that failed and the policies that were left out; returns the
-    exit code.
+    """Play the tasks of the study `name` and return the exit code. Results go to runs/ under
+    `folder`, unless the options say otherwise. Prints tables, failed tasks and policies that were
+    left out.
     """
     study = STUDIES[name]
     # A refusal by environment or policy comes once, before anything is played; weights may be of
@@ -118,7 +118,7 @@ def run_study(
     with _journal(folder, study) as journal:
         check_folder(folder, configs, study, journal, force)
         print_lines(goes, file=sys.stderr)
-        others = _say_what_is_found(configs, journal, folder, kind.unit)
+        others = _report_found(configs, journal, folder, kind.unit)
         note_begin(folder, study.name, counted(len(configs), kind.task), others, command)
 
         # The journal keeps what finishes, even if this process ends before results are written.
@@ -157,9 +157,7 @@ def _journal(folder: Path, study: Study) -> Journal:
         raise InvalidInput(f"cannot write results to {folder}: {error.strerror}") from error
 
 
-def _say_what_is_found(
-    configs: Sequence[RunConfig], journal: Journal, folder: Path, unit: str
-) -> int:
+def _report_found(configs: Sequence[RunConfig], journal: Journal, folder: Path, unit: str) -> int:
     """Print one line when the journal holds tasks of this study or of others, and one for lines of
     it that are damaged; returns how many of others it holds.
     """

@@ -48,10 +48,9 @@ def check_values(command: object, *axes: str) -> None:
 
 
 def buildable(names: Sequence[str], given: Parameters) -> tuple[list[str], list[str]]:
-    """The scenarios, each once, whose worlds can be built with the `given` parameters, and a line
-    for each of the others, which is printed too; `all` stands for every known one.
-
-    Raises InvalidInput for an unknown scenario or parameter, and where none is left.
+    """Return the scenarios whose worlds can be built with the `given` parameters. Each comes once;
+    `all` stands for every known one. Also returns, and prints, a line for each scenario that cannot
+    be built. Raises InvalidInput for an unknown scenario or parameter, and where none is left.
     """
     wanted = expanded(names, scenario_names())
     report_problems([line for one, line in PLUGINS.refusals() if scenario_of(one.name) in wanted])
@@ -125,7 +124,7 @@ def _policies(names: Sequence[str]) -> list[str]:
     return expanded(names, contenders() if _ALL in names else ())
 
 
-def in_turn(several: Sequence[Any], name: str, common: dict[str, Any]) -> Sequence[Any]:
+def take_values(several: Sequence[Any], name: str, common: dict[str, Any]) -> Sequence[Any]:
     """The values of a condition that a sweep plays in turn: `several`, or else the one in `common`,
     which loses it.
     """
@@ -158,8 +157,8 @@ def common_of(options: PlayOptions, policies: Sequence[str]) -> dict[str, Any]:
 
 
 def source_named(options: SourceOptions, text: str) -> "Source":
-    """The source that a text and the options name. Without --sweeps a detector that they name is
-    fed as many as it asks for. Raises InvalidInput if there is no such source.
+    """Return the source that a text and the options name. Without --sweeps a detector gets its own
+    number of sweeps. Raises InvalidInput if there is no such source.
     """
     # Imported here because the kinds of recordings load SciPy and PyArrow.
     from care_sim.sources.feeding import source_for

@@ -36,7 +36,7 @@ from care_sim.sensors.pictures import (
     class_table,
     faultless_detections,
     reported_boxes,
-    surest_first,
+    sort_by_confidence,
 )
 from care_sim.world.bullet import FAR_M
 from care_sim.world.world import WORLD_STEP_S, World
@@ -335,7 +335,7 @@ def _look(
             count += len(rows)
         if not cameras.unsorted[w]:
             rows, objects = seen.rows[w, :count], seen.objects[w, :count]
-            surest, objects = surest_first(rows, objects, cameras.least[w])
+            surest, objects = sort_by_confidence(rows, objects, cameras.least[w])
             _copy_rows(surest, seen.rows[w])
             _copy(objects, seen.objects[w])
             count = len(surest)

@@ -9,11 +9,11 @@ from care_sim.loops.stages.detecting import Found
 from care_sim.loops.stages.state import Sensors, State, TrackTables, placed_by, seen_by
 from care_sim.perception.tracker import (
     MemoryRules,
-    assigned,
+    advance_tracks,
+    assign_pairs,
     forecast_in_place,
-    lived_on,
     possible_pairs,
-    seen_nearest_first,
+    sort_by_distance,
 )
 from care_sim.perception.tracker import Rules as LifeRules
 
@@ -46,7 +46,7 @@ class Tracking:
             classes = found.classes[world, :count]
             boxes = placed_by(state.taken, world, found.boxes[world, :count])
             table = state.tracks.rows[world, : state.tracks.counts[world]]
-            pairs = assigned(table, classes, boxes, self._life)
+            pairs = assign_pairs(table, classes, boxes, self._life)
             _keep(state.tracks, world, classes, boxes, pairs, self._life, found.tracks)
 
     def predict(self, state: State) -> None:
@@ -98,7 +98,7 @@ def _keep(
 ) -> None:
     """Let the tracks of a world live on, and write those of its detections into `ids` (W, D)."""
     table = tracks.rows[w, : tracks.counts[w]]
-    kept, numbers = lived_on(table, classes, boxes, pairs, life, tracks.next_ids[w])
+    kept, numbers = advance_tracks(table, classes, boxes, pairs, life, tracks.next_ids[w])
     tracks.rows[w, : len(kept)] = kept
     tracks.counts[w] = len(kept)
     for n in range(len(numbers)):
@@ -122,4 +122,4 @@ def _see(live: Mask, tracks: TrackTables, sensors: Sensors, seen: Floats) -> Non
             table = tracks.rows[w, : tracks.counts[w]]
             turn = sensors.turns_back[w, 0], sensors.turns_back[w, 1]
             boxes = seen_by(sensors, w, table[:, _BOX:_BOX_END])
-            seen[w, : len(table)] = seen_nearest_first(table, boxes, turn)
+            seen[w, : len(table)] = sort_by_distance(table, boxes, turn)

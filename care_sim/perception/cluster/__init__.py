@@ -1,1 +1,3 @@
-"""The detector that sees points only: remove the road, group points, fit boxes, tell classes."""
+"""The detector `cluster`, which reads only points: remove the road, group points, fit boxes,
+classify.
+"""

@@ -1,8 +1,8 @@
-"""The box of a body, by the sides that its points show: the rectangle that fits their corner, and
-the class whose size fits the rectangle.
+"""Boxes from the sides that points show: fit a rectangle to their corner, then the class whose size
+fits the rectangle.
 
-A typical size of a class says how long each shown side should look. A side that the scan does not
-resolve says only that the body is no smaller; the far sides follow from the typical size.
+The typical size of a class gives the expected length of each shown side. A side that the scan does
+not resolve is only a lower bound; the far sides follow from the typical size.
 """
 
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ from care_sim.perception.cluster.points import COLUMNS_APART, NEAR_RADIUS_M, clu
 from care_sim.world.bodies import CATALOGUE
 
 STEP_DEG = 1.0
-"""Between two headings tried: over half a car's length it is 4 cm."""
+"""Step between headings tried: 4 cm over half a car's length."""
 ON_THE_SIDE_M = 0.02
-"""Nearer to a side no point counts more: the noise of a range."""
+"""Smallest distance of a point to a side that counts: the noise of a range."""
 
 DECIMALS = 6
-"""Candidates whose scores agree in so many are equal, whatever the last bits of a processor, and
+"""Decimals of a candidate's score. Candidates that agree in them are equal on every processor, and
 the first is taken.
 """
 
@@ -48,8 +48,8 @@ class Sides:
 
     @property
     def outside(self) -> Floats:
-        """(2,) how far the sensor is off the rectangle along each axis; 0 where it is level with
-        it.
+        """Return (2,) the sensor's distance from the rectangle along each axis; 0 within its
+        extent.
         """
         return np.maximum(np.maximum(self.low, -self.high), 0.0)
 
@@ -60,9 +60,10 @@ class Sides:
 
 
 def fit_sides(plan: Floats) -> Sides:
-    """The rectangle of points (n, 2), n >= 1, x, y in the sensor frame: L-shape fitting by search,
-    closeness criterion (Zhang, Xu, Dong, Dolan, "Efficient L-shape fitting for vehicle detection
-    using laser scanners", IEEE Intelligent Vehicles Symposium 2017, Algorithms 2 and 4).
+    """Fit the rectangle of points (n, 2), n >= 1, x, y in the sensor frame. The method is L-shape
+    fitting by search with the closeness criterion. Source: Zhang, Xu, Dong, Dolan, "Efficient
+    L-shape fitting for vehicle detection using laser scanners", IEEE Intelligent Vehicles Symposium
+    2017, Algorithms 2 and 4.
 
     Headings are tried from the bearing of the points on, so the fit turns with them.
     """
@@ -72,14 +73,14 @@ def fit_sides(plan: Floats) -> Sides:
     axes = np.stack([np.stack([cos, sin], -1), np.stack([-sin, cos], -1)], axis=1)
     along = axes @ plan.T
 
-    # Rounded, so that of headings equal but for the last bits the first is taken.
+    # Rounded, so that the first of headings that differ only in the last bits is taken.
     best = axes[np.argmax(np.round(_closeness(along), DECIMALS))]
     return Sides(best, (best @ plan.T).min(axis=1), (best @ plan.T).max(axis=1))
 
 
 def _closeness(along: Floats) -> Floats:
-    """(h,) the sum over the points of 1 / distance to the nearer of the two shown sides; `along` is
-    (h, 2, n).
+    """Return (h,) the sum over points of 1 / distance to the nearer of the two shown sides; `along`
+    is (h, 2, n).
     """
     to_low = along - along.min(axis=2, keepdims=True)
     to_high = along.max(axis=2, keepdims=True) - along
@@ -99,17 +100,18 @@ SIZE_SPREAD = 0.1
 adults 1.5 to 2 m.
 """
 FIT_M = 0.1
-"""Standard deviation of a fitted side, beside what the grid leaves open: rounded corners, mirrors,
-a swung arm.
+"""Standard deviation of a fitted side in addition to the grid's resolution: rounded corners,
+mirrors, a swung arm.
 """
 MOST_MISFIT = 11.3
-"""No class: the misfit of a body of the class stays below in 99 of 100 cases (chi-squared, three
+"""Largest misfit of a class: 99 of 100 bodies of the class stay below it (chi-squared, three
 dimensions).
 """
 
 _TYPICAL = ("car", "van", "truck", "bus", "bicycle", "pedestrian")
-"""The bodies whose sizes are known to it: what stands for a class. A child or a test's target is
-recognised as far as it resembles one of them."""
+"""The bodies whose sizes represent the classes. A child or a test's target is recognised as far as
+it resembles one of them.
+"""
 _CLASSED = [CATALOGUE[name] for name in _TYPICAL]
 _CLASSES: Integers = np.array([CLASSES.index(kind.label or "") for kind in _CLASSED] * 2)
 _SIZES: Floats = np.array([kind.size for kind in _CLASSED])
@@ -134,7 +136,7 @@ class Guess:
 def best_guess(
     sides: Sides, top_m: float, road_z: float, sensor_height_m: float, grid: Grid
 ) -> Guess:
-    """The class and box for `sides` whose highest point is `top_m` above the road, itself at
+    """Return the best class and box for `sides` whose highest point is `top_m` above the road at
     `road_z`.
     """
     seen = np.append(
@@ -146,16 +148,17 @@ def best_guess(
 
 
 def _hidden_ends(sides: Sides, grid: Grid) -> Floats:
-    """(2,) a side ends half a column, on average, beyond its last point at either end."""
+    """Return (2,) the hidden length per side: half a column, on average, beyond the last point at
+    either end.
+    """
     return np.asarray(grid.column_width * np.abs(sides.middle[::-1]))
 
 
 def _misfits(sides: Sides, seen: Floats, sensor_height_m: float, grid: Grid) -> Floats:
-    """(2k,) sum of the squared deviations of `seen` (3,) from each typical size, in standard
+    """Return (2k,) the sum of squared deviations of `seen` (3,) from each typical size, in standard
     deviations.
 
-    No side should look longer than the body is, nor shorter than the part of it that hangs
-    together.
+    A side should not look longer than the body, nor shorter than its connected part.
     """
     # Either end of a side lies anywhere within half a step of its last point: a variance of
     # step^2 / 12 each, and step^2 / 6 for both. Of the height only the top is uncertain, so its
@@ -163,8 +166,8 @@ def _misfits(sides: Sides, seen: Floats, sensor_height_m: float, grid: Grid) -> 
     range_m = sides.range_m
     steps = np.array([grid.column_width, grid.column_width, grid.row_height / np.sqrt(2)]) * range_m
 
-    # A side that the scan does not show in one piece may look as short as the piece, and shorter by
-    # what a gap between clusters takes. The same holds for a top above the highest row.
+    # A side that the scan shows in several pieces may look as short as a piece minus the gap
+    # between clusters. The same holds for a top above the highest row.
     shown = np.minimum(
         _ALONG, np.append(_hanging(sides, grid), sensor_height_m + range_m * np.tan(grid.top))
     )
@@ -177,10 +180,10 @@ def _misfits(sides: Sides, seen: Floats, sensor_height_m: float, grid: Grid) -> 
 
 
 def _hanging(sides: Sides, grid: Grid) -> Floats:
-    """(2,) how much of the side along each axis may be seen in one piece, metres.
+    """Return (2,) the length of the side along each axis that may be seen in one piece, metres.
 
-    At the range r, the points of a side that lies d off the sensor are r^2 / d columns apart; they
-    hang together as far as this is within the cluster radius.
+    At range r, points of a side at distance d from the sensor are r^2 / d columns apart. They are
+    connected where this is within the cluster radius.
     """
     off = sides.outside[::-1]
     farthest = np.maximum(np.sqrt(NEAR_RADIUS_M * off / grid.column_width), COLUMNS_APART * off)
@@ -190,11 +193,11 @@ def _hanging(sides: Sides, grid: Grid) -> Floats:
 
 
 def _completed(sides: Sides, seen: Floats, which: int, road_z: float) -> Floats:
-    """(7,) the box on the shown sides: from the nearest end away from the sensor, or about the
-    middle where the sensor is level with the side. The heading is known but for half a turn: it
-    points away from the sensor.
+    """Return (7,) the box on the shown sides. It extends from the nearest end away from the sensor,
+    or about the middle where the sensor is level with the side. The heading is ambiguous by half a
+    turn; it points away from the sensor.
     """
-    # A body is at least as large as it looks; what is hidden of it is that of its class.
+    # A body is at least as large as it looks; its hidden part has the size of its class.
     extents = np.maximum(seen, _ALONG[which])
     half = extents[:2] / 2
     along = np.where(
@@ -202,7 +205,7 @@ def _completed(sides: Sides, seen: Floats, which: int, road_z: float) -> Floats:
     )
     centre = along @ sides.axes
     forward = which // len(_CLASSED)
-    # Rounded: a body straight abeam points one way, whatever the last bits.
+    # Rounded, so that a body straight abeam points the same way on every processor.
     heading = sides.axes[forward] * (
         1.0 if np.round(sides.middle[forward], DECIMALS) >= 0 else -1.0
     )

@@ -19,16 +19,14 @@ from care_sim.perception.cluster.points import (
 )
 
 OWN_ROOF_M = 2.0
-"""Nearer to the sensor than this there is the roof that carries it: of a recorded nuScenes sweep a
-quarter.
-"""
+"""Range within which returns are the car's own roof: a quarter of a recorded nuScenes sweep."""
 
 _GRID = AngularGrid()
 
 
 @dataclass(frozen=True)
 class _Candidate:
-    """A cluster: its number of `points`, the `place` (2,) amid them, and what it may be."""
+    """A cluster: its number of `points`, the `place` (2,) amid them, and its best guess."""
 
     points: int
     place: Floats
@@ -36,22 +34,23 @@ class _Candidate:
 
 
 class ClusterDetector:
-    """A detector that sees points only: the road removed, DBSCAN, boxes on the shown sides, classes
+    """A detector that reads only points: remove the road, DBSCAN, boxes on the shown sides, classes
     by size.
 
     These four steps are classical, with nothing learned (`points`, `boxes`).
 
-    `grid` tells how far apart neighbouring points are. A cluster counts from three points on, as
-    for the proxy. The confidence of n points is 1 - 1 / sqrt(n), since the error of an average
-    falls as 1 / sqrt(n). The order of the points does not matter.
+    `grid` gives the distance of neighbouring points. A cluster needs three points, as for the
+    proxy. The confidence of n points is 1 - 1 / sqrt(n), since the error of an average falls as 1 /
+    sqrt(n). The order of the points does not matter.
 
-    Measured with every cell fired on one body of the catalogue alone, 12 headings per range, found
-    within 2 m in its class: cars, trucks and buses 99% to 25 m and 97% from 30 to 45 m; pedestrians
-    98% to 20 m, 58% at 25 and 30 m (3 returns), none beyond; bicycles 93% to 20 m, 25% at 25 and 30
-    m (most are taken for pedestrians), none beyond. Amid the bodies of six generated streets, of
-    objects with three returns or more: 93% to 15 m, 59% from there to 30 m, 44% from there to 50 m
-    (what is seen of a car in a parked row is taken for a pedestrian or bicycle); of 29 detections
-    per keyframe 16 match no such object.
+    Recall with every cell fired on a single body of the catalogue, 12 headings per range, within 2
+    m and in its class. Cars, trucks and buses: 99% to 25 m and 97% from 30 to 45 m. Pedestrians:
+    98% to 20 m, 58% at 25 and 30 m (3 returns), none beyond. Bicycles: 93% to 20 m, 25% at 25 and
+    30 m (most are taken for pedestrians), none beyond.
+
+    Recall on six generated streets, of objects with three returns or more: 93% to 15 m, 59% from
+    there to 30 m, 44% from there to 50 m. Parts of cars in a parked row are taken for pedestrians
+    or bicycles. Of 29 detections per keyframe 16 match no such object.
     """
 
     far = False
@@ -73,7 +72,7 @@ class ClusterDetector:
         standing = points[above]
         heights = heights[above]
 
-        # Fewer points than the proxy asks for are no object; what fits no class is dropped; of two
+        # Clusters with fewer points than the proxy needs, or that fit no class, are dropped. Of two
         # candidates at one place the one with more points stays.
         clusters = [
             rows for rows in clusters_of(standing[:, :2], self._grid) if len(rows) >= MIN_RETURNS
@@ -82,7 +81,9 @@ class ClusterDetector:
             self._candidate(standing[rows], heights[rows].max(), plane, sensor_height_m)
             for rows in clusters
         ]
-        return _detections(_one_a_place([one for one in found if one.guess.misfit <= MOST_MISFIT]))
+        return _detections(
+            _drop_overlaps([one for one in found if one.guess.misfit <= MOST_MISFIT])
+        )
 
     def _candidate(
         self, points: Floats, top_m: float, plane: Floats, sensor_height_m: float
@@ -94,18 +95,18 @@ class ClusterDetector:
 
 
 def _in_order(points: Floats) -> Floats:
-    """Points (P, 3) sorted, so that sums over them come out the same to the last bit."""
+    """Return points (P, 3) sorted, so that sums over them are bit-identical."""
     array = np.asarray(points, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] != 3 or not np.isfinite(array).all():
         raise InvalidInput(f"points must be (P, 3) finite numbers, got the shape {array.shape}")
     return array[np.lexsort(array.T)]
 
 
-def _one_a_place(found: list[_Candidate]) -> list[_Candidate]:
-    """Two bodies do not share a place: points in the box of a candidate that has more of them are
-    its own.
+def _drop_overlaps(found: list[_Candidate]) -> list[_Candidate]:
+    """Drop candidates inside the box of a candidate with more points, since two bodies do not share
+    a place.
 
-    Such are a windscreen behind a bonnet, and a side seen too obliquely to hang together.
+    Examples are a windscreen behind a bonnet, and a side seen too obliquely to be connected.
     """
     # Those with the most points come first, then the nearest. The distance is rounded, so that the
     # order of equal ones is not that of their last bits.

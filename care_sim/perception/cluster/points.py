@@ -1,4 +1,4 @@
-"""Which points lie on the road, and which of the others belong together."""
+"""Separate road points, and group the others."""
 
 import numpy as np
 
@@ -6,16 +6,17 @@ from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.cells.stack import Grid
 
 STEEPEST = 0.03
-"""The most by which the road may slope against the car's own plane: 1 degree of pitch, as under
-hard braking, and the bend of a road over 50 m."""
-SETTLING_M = 0.15
-"""The most by which the road beneath may lie off the nominal height of the sensor: springs, and a
-kerb climbed.
+"""Largest slope of the road against the car's own plane: 1 degree of pitch, as under hard braking,
+and the bend of a road over 50 m.
 """
+SETTLING_M = 0.15
+"""Largest offset of the road from the sensor's nominal height: springs, and a climbed kerb."""
 ROUGHNESS_M = 0.05
-"""Noise of ranges and unevenness; what lies much further off the plane has next to no vote."""
+"""Noise of ranges and unevenness. Points much farther off the plane have hardly any weight."""
 KERB_CLEARANCE_M = 0.25
-"""Nothing lower than this above the plane is an object: a kerb (0.15 m) and twice the roughness."""
+"""Height above the plane from which a point is an object: a kerb (0.15 m) and twice the
+roughness.
+"""
 
 
 def heights_above(points: Floats, plane: Floats) -> Floats:
@@ -24,11 +25,11 @@ def heights_above(points: Floats, plane: Floats) -> Floats:
 
 
 def road_plane(points: Floats, sensor_height_m: float) -> Floats:
-    """(3,) a, b, c of the road z = a x + b y + c in the sensor frame.
+    """Return (3,) a, b, c of the road z = a x + b y + c in the sensor frame.
 
-    Least squares with Cauchy's loss over the points that could lie on the road; slope and offset
-    are bounded, so few or misleading points do little, and none give the level plane beneath the
-    sensor. The fit turns with the points.
+    The fit is least squares with Cauchy's loss over points that could lie on the road. Slope and
+    offset are bounded, so few or misleading points do little harm. Without points the plane is
+    level. The fit turns with the points.
     """
     level = np.array([0.0, 0.0, -sensor_height_m])
     low = points[_could_be_road(points, level)]
@@ -52,8 +53,8 @@ def road_plane(points: Floats, sensor_height_m: float) -> Floats:
 
 
 def _bounded(free: Floats) -> tuple[Floats, Floats]:
-    """(3,) a departure from the level plane, slope below STEEPEST whatever its direction and offset
-    below SETTLING_M, from three free numbers; and its derivatives (3, 3).
+    """Return (3,) a departure from the level plane from three free numbers, and its derivatives (3,
+    3). The slope stays below STEEPEST in every direction, the offset below SETTLING_M.
     """
     departure = np.empty(3)
     derivatives = np.zeros((3, 3))
@@ -67,7 +68,7 @@ def _bounded(free: Floats) -> tuple[Floats, Floats]:
 
 
 def _could_be_road(points: Floats, level: Floats) -> Mask:
-    # As far off the level plane as the road may be at most at this range, and its roughness.
+    # The largest distance of the road from the level plane at this range, plus its roughness.
     reach = SETTLING_M + ROUGHNESS_M + STEEPEST * np.hypot(points[:, 0], points[:, 1])
     return np.asarray(np.abs(heights_above(points, level)) <= reach)
 
@@ -77,8 +78,9 @@ NEAR_RADIUS_M = 0.3
 below.
 """
 COLUMNS_APART = 2.0
-"""Far away, neighbours are this many columns apart at most: one cell may be unfired or without
-return, or the surface be seen at 60 degrees."""
+"""Largest distance of far neighbours in columns: one cell may be unfired or without return, or the
+surface seen at 60 degrees.
+"""
 
 
 def cluster_radius(grid: Grid, range_m: float) -> float:
@@ -87,14 +89,17 @@ def cluster_radius(grid: Grid, range_m: float) -> float:
 
 
 def clusters_of(plan: Floats, grid: Grid) -> list[Integers]:
-    """The clusters of points (P, 2) x, y in the sensor frame, as indices; every point is in one.
+    """Return the clusters of points (P, 2), x, y in the sensor frame, as indices; every point is in
+    one.
 
-    Two points nearer than `cluster_radius` belong together, and so do those that others connect.
-    This is DBSCAN with one point as the least (Ester, Kriegel, Sander, Xu, KDD 1996): every point
-    is a core point, so no border point can fall to either of two clusters, and the order of the
-    points does not matter. Clusters come in the order of their first points. In plan, because road
-    users stand beside each other and not on top: the rows of the scan, 0.023 rad apart (1 m at
-    45 m), then need no bridging, only the columns, 0.012 rad apart, do.
+    Points nearer than `cluster_radius` belong together, directly or through others. This is DBSCAN
+    with a minimum of one point (Ester, Kriegel, Sander, Xu, KDD 1996). Every point is then a core
+    point, no border point is ambiguous, and the order of the points does not matter. Clusters come
+    in the order of their first points.
+
+    Clustering is in plan, since road users stand beside each other and not on top. Only gaps
+    between columns, 0.012 rad apart, then need bridging, not those between rows, 0.023 rad apart (1
+    m at 45 m).
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -103,11 +108,11 @@ def clusters_of(plan: Floats, grid: Grid) -> list[Integers]:
     if not len(plan):
         return []
     points = _even(plan, grid)
-    # The tree finds pairs up to its radius; neighbours are nearer than 1, and not at it.
+    # The tree finds pairs up to and including its radius; neighbours must be nearer than 1.
     pairs = cKDTree(points).query_pairs(np.nextafter(1.0, 0.0), output_type="ndarray")
 
-    # Clusters are the parts of the graph of neighbours that hang together. A stable sort by label
-    # keeps their points in order, and labels are given in the order of first points.
+    # Clusters are the connected parts of the graph of neighbours. A stable sort by label keeps
+    # their points in order, and labels follow the order of first points.
     near = coo_array((np.ones(len(pairs), bool), pairs.T), shape=(len(points), len(points)))
     _, labels = connected_components(near, directed=False)
     order = np.argsort(labels, kind="stable")
@@ -115,11 +120,11 @@ def clusters_of(plan: Floats, grid: Grid) -> list[Integers]:
 
 
 def _even(plan: Floats, grid: Grid) -> Floats:
-    """(P, 3) where `cluster_radius` is 1 everywhere.
+    """Map points to (P, 3) where `cluster_radius` is 1 everywhere.
 
-    A disc as far as the radius is constant; beyond, where it is a share of the range, the disc goes
-    on as a tube around its rim, with the logarithm of the range along it: lengths r dphi and dr are
-    divided alike.
+    The map is a disc as far as the radius is constant. Beyond, where the radius is a share of the
+    range, the disc continues as a tube around its rim, along the logarithm of the range. Lengths r
+    dphi and dr are then divided alike.
     """
     # At the rim both rules for the radius give the same. Within it `beyond` is 1 and its logarithm
     # 0: a flat disc in units of the constant radius.

@@ -1,5 +1,5 @@
-"""Detectors as they were measured on real data, from counts of returns: recall, persistence of
-misses, scores, errors and false boxes of CenterPoint, Megvii and PointRCNN.
+"""Detectors as measured on real data, by number of returns: recall, persistence of misses, scores,
+errors and false boxes of CenterPoint, Megvii and PointRCNN.
 
-`shipped/README.md` is their card: the data, the formula, the numbers and what they cannot tell.
+`shipped/README.md` is their card: data, formula, numbers and limitations.
 """

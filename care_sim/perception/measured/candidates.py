@@ -1,11 +1,12 @@
-"""Candidates for false boxes: they are born, stay where they are in the world, and end.
+"""Candidates for false boxes, which appear, stay at one place in the world, and end.
 
-The whole world holds candidates of even density. The episode's seed, the tile and the keyframe
-alone draw them: every car meets the same ones at the same place and time. A part of each class
-lasts (`lasting`, `lasts_s`), the rest is there for `flash_s`. Each candidate has a rank from 0 to
-1. It is a false box while its rank is below the density of its class at its distance, divided by
-the highest density of the class. So the car meets the measured density at every distance, on all
-sides, at any speed.
+Candidates have an even density in the whole world. They depend only on the episode's seed, the tile
+and the keyframe, so every car meets the same ones at the same place and time. A part of each class
+lasts (`lasting`, `lasts_s`), the rest stays for `flash_s`.
+
+Each candidate has a rank from 0 to 1. It is a false box while its rank is below the density of its
+class at its distance, divided by the highest density of the class. So the car meets the measured
+density at every distance, on all sides, at any speed.
 """
 
 import math
@@ -19,17 +20,18 @@ from care_sim.core.arrays import Floats, Integers
 from care_sim.perception.measured.tables import Measurement
 
 RING_M = 10.0
-"""Distances are known by rings of so many metres."""
+"""Width of a ring of distances, metres."""
 REACH_M = 50.0
-"""No false box was counted beyond."""
+"""Largest distance of counted false boxes."""
 TILE_M = 20.0
-"""The side of a tile. Candidates are made for tiles within reach."""
+"""Side of a tile. Candidates are made for tiles within reach."""
 LONGEST_LIVES = 20
-"""Of 500 million candidates one lasts longer than as many mean lives."""
+"""Longest life in mean lives: one of 500 million candidates lasts longer."""
 LABEL, X, Y, SCORE, LAST, AHEAD, RANK, KIND = 0, 1, 2, 8, 9, 10, 11, 12
 """Columns of a table of candidates (n, 13): class, world box (7) without its height above the road,
-score, last keyframe, a number below `kept_ahead` where the box may be on the road ahead, rank, row
-of `Kinds`."""
+score, last keyframe, a uniform number, rank, row of `Kinds`. A candidate may be on the road ahead
+if the number is below `kept_ahead`.
+"""
 COLUMNS = KIND + 1
 
 Place = tuple[float, float]
@@ -42,8 +44,9 @@ class Kinds(NamedTuple):
 
     labels: Integers
     means: Floats
-    """(2, k) candidates per tile: those of the first keyframe, and those that are born at a later
-    one. Cumulative over the kinds."""
+    """(2, k) new candidates per tile: at the first keyframe, and at a later one. Cumulative over
+    the kinds.
+    """
     lives: Floats
     """(k,) mean lives in keyframes."""
     shares: Floats
@@ -51,13 +54,15 @@ class Kinds(NamedTuple):
     scores: Floats
     """(k, m) ascending scores."""
     logs: Floats
-    """(k, m) logarithm of the number from each of the scores on; -inf where a kind has fewer."""
+    """(k, m) logarithm of the number of boxes from each score on; -inf where a kind has fewer
+    scores.
+    """
     log_sizes: Floats
     """(k, 3, 2) mean and spread of the logarithms of length, width and height."""
 
 
 def kinds_of(measured: Measurement, keyframe_s: float) -> Kinds:
-    """The kinds of a detector, by keyframes of a length."""
+    """Return the kinds of a detector for a keyframe length."""
     known = measured.false_boxes
     lasting = np.array([one.lasting for one in known])
     lives = np.array([one.lasts_s for one in known])
@@ -90,8 +95,8 @@ def kinds_of(measured: Measurement, keyframe_s: float) -> Kinds:
 def advance_candidates(
     table: Floats, seed: np.uint64, keyframe: int, place: Place, before: Place, kinds: Kinds
 ) -> Floats:
-    """The candidates (n, 13) of a keyframe within reach of a sensor at a `place`, from those of the
-    keyframe before, when it was at another one (nan at the start).
+    """Return the candidates (n, 13) of a keyframe within reach of a sensor at `place`, from those
+    of the keyframe before at its earlier place (nan at the start).
     """
     living, count = np.empty((2 * len(table) + 16, COLUMNS)), 0
     for row in table:
@@ -115,8 +120,8 @@ def advance_candidates(
 def _add_births(
     living: Floats, count: int, seed: np.uint64, tile: Tile, time: tuple[int, int], kinds: Kinds
 ) -> tuple[Floats, int]:
-    """Add a tile's candidates that are born from the first keyframe of `time` to the last one, and
-    alive at the last one, to the `count` in a table. Returns the table, or a longer one.
+    """Add a tile's candidates to the `count` in a table: those born within the keyframes of `time`
+    and alive at its end. Returns the table, or a longer one.
     """
     first, keyframe = time
     key = mixed(mixed(seed, tile[0] + 2**40), tile[1] + 2**40)
@@ -126,7 +131,7 @@ def _add_births(
         for birth in range(_poisson(uniform(now, 0), means[-1])):
             own = mixed(now, birth + 1)
             kind = np.searchsorted(means, uniform(own, 0) * means[-1])
-            # It is there now, and as long as its exponential life lasts.
+            # The candidate stays from now on for its exponential life.
             last = born + math.floor(-kinds.lives[kind] * math.log(uniform(own, 1)))
             if last < keyframe:
                 continue
@@ -140,7 +145,7 @@ def _add_births(
 
 @compiled()
 def _tiles(along: float) -> tuple[int, int]:
-    """The first tile within reach along an axis, and the first one beyond."""
+    """Return the first tile within reach along an axis, and the first one beyond."""
     first, last = (along - REACH_M) / TILE_M, (along + REACH_M) / TILE_M
     return math.floor(first), math.floor(last) + 1
 
@@ -167,7 +172,9 @@ def _poisson(share: float, mean: float) -> int:
 
 @compiled()
 def _fill(row: Floats, key: np.uint64, tile: Tile, kind: int, kinds: Kinds) -> None:
-    """Draw a candidate of a tile into its row; uniform numbers 0 and 1 of its key are taken."""
+    """Draw a candidate of a tile into its row. Uniform numbers 0 and 1 of its key are already
+    used.
+    """
     row[LABEL], row[KIND] = kinds.labels[kind], kind
     row[X] = (tile[0] + uniform(key, 2)) * TILE_M
     row[Y] = (tile[1] + uniform(key, 3)) * TILE_M
@@ -182,8 +189,8 @@ def _fill(row: Floats, key: np.uint64, tile: Tile, kind: int, kinds: Kinds) -> N
 
 @compiled()
 def _score_at(scores: Floats, logs: Floats, share: float) -> float:
-    """The score from which on there is a `share` of all boxes. Between two scores, and beyond the
-    last, the logarithm of the number is a line.
+    """Return the score from which on there is a `share` of all boxes. Between two scores, and
+    beyond the last, the logarithm of the number is linear.
     """
     wanted, place = math.log(share) + logs[0], 0
     while place + 2 < len(scores) and logs[place + 1] > wanted and logs[place + 2] > -math.inf:

@@ -1,4 +1,4 @@
-"""Detectors that report objects as CenterPoint, Megvii and PointRCNN did on real data."""
+"""Detectors that report objects like CenterPoint, Megvii and PointRCNN on real data."""
 
 import math
 from typing import ClassVar
@@ -27,16 +27,19 @@ those of the last ten keyframes, of 0.1 s each. Of longer ones it has as many as
 
 
 class MeasuredDetector(Detector):
-    """A detector as it was measured: it reports an object by chance, the surer the more returns.
+    """A detector as measured: it reports an object with a chance that grows with its returns.
 
-    `first_hit` is what a return counts in a film that was not there a keyframe ago: 0.55, as with
-    ten equal sweeps since then; 0.1 where nine of ten sweeps were fired by the mask before, 1.0
-    where all were fired by the coming one. It changes nothing in the closed loop, nor in films with
-    keyframes of less than 0.5 s, where the sweeps before are known. `worth` are the returns of the
-    detector's own sensor that one return is worth, measured by class and divided by the density of
-    rays unless given; on sweeps that this sensor recorded it is 1. What scores below `track_score`
-    becomes no track; it is given in the detector's own scale. `false_boxes` and `box_errors` switch
-    these on. Raises InvalidInput for a value out of its bounds.
+    `first_hit` is the weight, in films, of a return that was not there a keyframe ago. It is 0.55
+    for ten equal sweeps since then, 0.1 if the mask before fired nine of ten sweeps, 1.0 if the
+    next mask fired all. It has no effect in the closed loop, nor in films with keyframes of less
+    than 0.5 s, where earlier sweeps are known.
+
+    `worth` is the number of returns of the detector's own sensor that one return counts. The
+    default is measured by class and divided by the density of rays; on sweeps of that sensor it is
+    1. Detections below `track_score`, in the detector's own scale, become no track. `false_boxes`
+    and `box_errors` switch these on.
+
+    Raises InvalidInput for a value out of its bounds.
     """
 
     name: ClassVar[str]
@@ -69,7 +72,7 @@ class MeasuredDetector(Detector):
         return MeasuredEpisode(self, seed, rig, is_filmed)
 
     def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
-        """Raises InvalidInput: luck belongs to an episode, which `begin` begins."""
+        """Raises InvalidInput: luck belongs to an episode, which `begin` starts."""
         raise InvalidInput(f"detector {self.name} needs an episode: call begin before detect")
 
 
@@ -92,7 +95,7 @@ class PointRCNN(MeasuredDetector):
 
 
 class MeasuredEpisode(Detector):
-    """A measured detector over the keyframes of one episode; `detect` is called once for each."""
+    """A measured detector in one episode; call `detect` once per keyframe."""
 
     wants_points = False
     is_matched = True
@@ -104,7 +107,7 @@ class MeasuredEpisode(Detector):
         self.track_score = rules.track_score
         self._measured = measured
         self._errors = rules.errors
-        # The closed loop drops what becomes no track, so that it need not be made.
+        # The closed loop drops boxes that become no track, so they need not be made.
         self._least = measured.least_score if is_filmed else rules.least_tracked
         worth = measured.recall.worth
         if rules.worth is not None:
@@ -160,7 +163,7 @@ class MeasuredEpisode(Detector):
         return Detections(classes, boxes, returns, self._measured.reported(scores)), objects
 
     def _meet(self, objects: Integers) -> None:
-        """Find the rows of this keyframe's `objects` (n,), and make those of new ones."""
+        """Return the rows of this keyframe's `objects` (n,), adding rows of new ones."""
         # The closed loop reports the same bodies at every keyframe.
         if np.array_equal(objects, self._objects):
             return
@@ -184,7 +187,7 @@ class MeasuredEpisode(Detector):
 def sweep_weights(
     measured: Measurement, first_hit: float, keyframe_s: float, is_filmed: bool
 ) -> Floats:
-    """(k,) the weights of this keyframe's returns and of those before, newest first."""
+    """Return (k,) the weights of this keyframe's returns and of earlier ones, newest first."""
     if measured.sweeps == 1:
         return np.ones(1)
     if is_filmed and keyframe_s > measured.step_s - 1e-9:

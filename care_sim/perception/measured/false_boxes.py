@@ -1,4 +1,4 @@
-"""False boxes of a measured detector: those of the candidates that it reports at a keyframe."""
+"""False boxes of a measured detector: the candidates that it reports at a keyframe."""
 
 import math
 from functools import lru_cache
@@ -31,15 +31,16 @@ from care_sim.perception.measured.tables import Measurement
 from care_sim.sensors.annotated import Annotations, Cloud
 
 FREE_WIDTH_M, FREE_LENGTH_M = 3.0, 20.0
-"""The road ahead on which false boxes are rare, wide and long. Of 1,342 from a score of 0.3 on, 0
-were there, where 8.5 would have been if false boxes were evenly spread over all directions."""
+"""Width and length of the road ahead, where false boxes are rare. Of 1,342 false boxes with a score
+of at least 0.3 none were there; an even spread would give 8.5.
+"""
 SHORT_M = 0.5
-"""A ray may end so far before the road or the box that it looks at, as at a kerb."""
+"""A ray may end this far before the road or the box, as at a kerb."""
 
 
 class View(NamedTuple):
-    """The cells of one LiDAR by ascending azimuth: cells, azimuths, elevations and their cosines,
-    and the distances on the ground at which their rays meet the road; the angle between two rows.
+    """The cells of one LiDAR by ascending azimuth: cells, azimuths, elevations and their cosines.
+    Also the ground distances at which their rays meet the road, and the angle between two rows.
     """
 
     cells: Integers
@@ -51,8 +52,8 @@ class View(NamedTuple):
 
 
 class FalseBoxPopulation:
-    """The false boxes of one episode with scores of `least_score` or more, a sensor that stands
-    `sensor_height_m` above the road, and keyframes `keyframe_s` apart.
+    """The false boxes of one episode with scores of `least_score` or more. The sensor is
+    `sensor_height_m` above the road, and keyframes are `keyframe_s` apart.
     """
 
     def __init__(
@@ -74,10 +75,10 @@ class FalseBoxPopulation:
         self._before: Place = math.nan, math.nan
 
     def draw(self, keyframe: int, sensor: Frame, cloud: Cloud, present: Annotations) -> Detections:
-        """The false boxes of a keyframe, with scores in the detector's own scale.
+        """Return the false boxes of a keyframe, with scores in the detector's own scale.
 
-        Nothing comes from nothing: a box is reported where the scan looks at it. Within MATCH_M of
-        an object of its class a box is a detection of that object, and none is false.
+        A box is reported only where the scan looks at its place. Within MATCH_M of an object of its
+        class a box would be a detection of that object, so no false box is there.
         """
         place = float(sensor.x), float(sensor.y)
         self._table = advance_candidates(
@@ -93,7 +94,7 @@ class FalseBoxPopulation:
             present.classes,
             np.ascontiguousarray(present.boxes, float),
         )
-        # Cells are those of the sensor as it stands: of gathered sweeps only the last one looks.
+        # Cells are in the current sensor frame: only the last of gathered sweeps counts.
         newest = cloud if cloud.newest is None else cloud.newest
         farthest, in_view = _farthest(newest, self._grid), np.zeros(len(kept), np.bool_)
         for head, view in zip(self._grid.heads, _views(self._grid, self._height_m), strict=True):
@@ -128,7 +129,7 @@ def _views(grid: Grid, sensor_height_m: float) -> tuple[View, ...]:
 
 
 def _farthest(cloud: Cloud, grid: Grid) -> Floats:
-    """(N,) the farthest range of each cell from its LiDAR, metres, 0 without a return."""
+    """Return (N,) the farthest range of each cell from its LiDAR, metres, 0 without a return."""
     known = cloud.points if cloud.ranges is None else cloud.ranges
     if len(known) != len(cloud):
         raise InvalidInput(f"a cloud must have a range per return: {len(known)} of {len(cloud)}")
@@ -142,9 +143,9 @@ def _farthest(cloud: Cloud, grid: Grid) -> Floats:
 def _candidates_now(
     candidates: tuple[Floats, Floats, Floats, float], classes: Integers, present: Floats
 ) -> Integers:
-    """The rows (k,) of the candidates that a free view would show. The `candidates` are their table
-    (n, 13), boxes (n, 7) in the sensor frame, shares by ring and `kept_ahead`; `present` are the
-    boxes (m, 7) of objects, and `classes` (m,) theirs.
+    """Return the rows (k,) of the candidates that a free view would show. `candidates` are their
+    table (n, 13), boxes (n, 7) in the sensor frame, shares by ring and `kept_ahead`. `present` are
+    the boxes (m, 7) of objects of `classes` (m,).
     """
     table, boxes, shares, kept_ahead = candidates
     shown, count = np.empty(len(boxes), np.int64), 0
@@ -174,7 +175,7 @@ def _is_of_another(x: float, y: float, label: float, classes: Integers, boxes: F
 
 @compiled()
 def _are_in_view(boxes: Floats, farthest: Floats, view: View) -> Mask:
-    """(n,) which of `boxes` (n, 7), as seen from the LiDAR, it has in view."""
+    """Return (n,) which of `boxes` (n, 7) the LiDAR has in view."""
     in_view = np.empty(len(boxes), np.bool_)
     for n in range(len(boxes)):
         in_view[n] = _is_in_view(boxes[n], farthest, view)
@@ -183,16 +184,16 @@ def _are_in_view(boxes: Floats, farthest: Floats, view: View) -> Mask:
 
 @compiled()
 def _is_in_view(box: Floats, farthest: Floats, view: View) -> bool:
-    """Whether a ray ends at a `box` (7,) or beyond; `farthest` (N,) are the ranges of all cells, 0
-    without a return. A ray of the row below may also end on the road before the box, unless one at
-    the height of the box ends too early: a wall can stand between that road and the box.
+    """Return True if a ray ends at a `box` (7,) or beyond; `farthest` (N,) are the ranges of all
+    cells, 0 without a return. A ray of the row below may also end on the road before the box. A ray
+    at the height of the box that ends too early rules this out, since a wall may stand between.
     """
     away = math.hypot(box[0], box[1])
     near = away - max(box[3], box[4]) / 2
     wide = math.atan2(max(box[3], box[4]) / 2, away)
     azimuth = math.atan2(box[1], box[0])
     foot = math.atan2(box[2] - box[5] / 2, away)
-    # Where rows are farther apart than the box is high, the height of the box has a row, too.
+    # If rows are farther apart than the box is high, the height of the box still has a row.
     top = max(math.atan2(box[2] + box[5] / 2, away), foot + view.row_height)
     is_road_seen = is_hidden = False
     for turn in (-2 * math.pi, 0.0, 2 * math.pi):

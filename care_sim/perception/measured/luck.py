@@ -1,8 +1,8 @@
-"""The luck of objects at a measured detector, and the errors of their boxes.
+"""The luck of objects with a measured detector, and the errors of their boxes.
 
-Both are made of standard normals that depend on the episode's seed, the object and the keyframe
-alone: every policy meets the same, whatever it fires, in whatever order objects are asked for. Each
-of `care_sim.perception.measured.tables.SIGNALS` is
+Both are made of standard normals that depend only on the episode's seed, the object and the
+keyframe. So every policy meets the same numbers, for any mask and any order of objects. Each of
+`care_sim.perception.measured.tables.SIGNALS` is
 
     sqrt(stays) * constant + sqrt(decays) * slow + sqrt(1 - stays - decays) * quick,
 
@@ -23,17 +23,18 @@ from care_sim.perception.measured.tables import SIGNALS, Luck
 LUCK, TURNED, FIRST_ERROR = range(3)
 """Places in `SIGNALS`."""
 CHANNELS = 3 * len(SIGNALS)
-"""Numbers of each object: of every signal the slow process and the quick one, then the constants.
-"""
+"""Numbers per object: the slow and the quick process of every signal, then the constants."""
 _CONSTANT = 2**20
-"""A keyframe that no episode reaches, whose normals are those that stay."""
+"""A keyframe that no episode reaches; its normals are the constants."""
 
 
 class Shares(NamedTuple):
-    """How `SIGNALS` are made at keyframes of a length; c classes."""
+    """Weights of `SIGNALS` for a keyframe length; c classes."""
 
     kept: Floats
-    """(c, 16) what a keyframe leaves of the slow process and of the quick one of each signal."""
+    """(c, 16) the factors by which the slow and the quick process of each signal decay per
+    keyframe.
+    """
     fresh: Floats
     """(c, 16) the weight of the normals that are added to them."""
     weights: Floats
@@ -52,7 +53,7 @@ class Memory(NamedTuple):
 
 
 def shares_of(luck: Luck, keyframe_s: float, flash_s: float) -> Shares:
-    """The shares of a detector, for keyframes of a length."""
+    """Return the shares of a detector for a keyframe length."""
     lasts = np.stack([luck.decay_s, np.full_like(luck.decay_s, flash_s)], axis=2)
     kept = np.where(lasts > 0, np.exp(-keyframe_s / np.maximum(lasts, 1e-9)), 0.0)
     new = np.maximum(1 - luck.stays - luck.decays, 0.0)
@@ -71,8 +72,8 @@ def signal_of(
     memory: Memory,
     shares: Shares,
 ) -> float:
-    """One of the `SIGNALS` of an object at a keyframe, a standard normal: `number` is that of the
-    object, `row` its place in the `memory`, which is advanced, and `place` its class and the
+    """Return one of the `SIGNALS` of an object at a keyframe, a standard normal. `number` is the
+    object's, `row` its place in the `memory`, which is advanced. `place` is its class and the
     signal.
     """
     label, signal = place

@@ -1,7 +1,7 @@
 """The recall of the measured detectors as a formula of returns.
 
-With n returns of the keyframe's own sweep and m per sweep on average over the sweeps that the
-detector gathers, an object has the effective returns
+Let n be the returns of the keyframe's own sweep, and m the average per gathered sweep. An object
+has the effective returns
 
     e = m where it gains returns (m <= n), else n + fall / 0.45 * (m - n), at most `most`.
 
@@ -28,8 +28,9 @@ from care_sim.core.types import CLASSES
 from care_sim.perception.measured.tables import Recall, measurement
 
 FIRST_HIT = 0.55
-"""Weight of a return of this keyframe that was not there a keyframe ago: ten equal sweeps, of
-which the newest is the keyframe's own, have on average 0.55 of it. The data say 0.35 to 0.55."""
+"""Weight of a return of this keyframe that was not there a keyframe ago. Ten equal sweeps, the
+newest at the keyframe, have on average 0.55 of it. The data give 0.35 to 0.55.
+"""
 
 
 class Latent(NamedTuple):
@@ -58,7 +59,9 @@ def latent_score(returns: float, label: int, table: Recall) -> Latent:
 
 @compiled()
 def score_of(latent: float, label: int, table: Recall, most: float) -> float:
-    """The score of a latent score with its luck, between the cuts of the class; -inf below all."""
+    """Return the score of a latent score with its luck, interpolated between the cuts of the class;
+    -inf below all.
+    """
     cuts, scores = table.cuts[label], table.scores
     if not latent > cuts[0]:
         return -math.inf
@@ -92,14 +95,17 @@ def recall(
     first_hit: float = FIRST_HIT,
     from_nothing: bool = False,
 ) -> Floats:
-    """The share of objects that a measured `detector` reports with a `score` or more.
+    """Return the share of objects that a measured `detector` reports with a `score` or more.
 
-    `name` is the class, `returns` (n,) are the returns on each object in the keyframe's sweep of
-    the detector's own sensor, and `previous` (n,) those a keyframe (0.5 s) ago, 0 for a newcomer;
-    without them the returns are steady. For `pointrcnn` returns are rays of an HDL-64 that stop at
-    the object's body, and `previous` counts nothing. `score` is in the detector's own scale, its
-    `track_score` unless given. An object without a return in either keyframe is not reported; with
-    `from_nothing` it has the fitted share, which also covers returns of sweeps between keyframes.
+    `name` is the class. `returns` (n,) are the returns on each object in the keyframe's sweep of
+    the detector's own sensor. `previous` (n,) are those a keyframe (0.5 s) ago, 0 for a newcomer;
+    by default the returns are steady. For `pointrcnn` returns are rays of an HDL-64 that stop at
+    the object's body, and `previous` is ignored. `score` is in the detector's own scale; the
+    default is its `track_score`.
+
+    An object without a return in either keyframe is not reported. With `from_nothing` it has the
+    fitted share, which also covers returns of sweeps between keyframes.
+
     Raises InvalidInput for another detector or class, and for a score that is not in the table.
     """
     measured = measurement(detector)
@@ -119,8 +125,8 @@ def recall(
 
 
 def cut_of(detector: str, name: str, score: float | None = None) -> float:
-    """The latent score above which an object of a class has a `score` or more, the detector's
-    `track_score` unless given. Raises InvalidInput for a score that is not in its table.
+    """Return the latent score above which an object of a class has at least `score`, by default the
+    detector's `track_score`. Raises InvalidInput for a score that is not in its table.
     """
     measured = measurement(detector)
     cuts = measured.recall.cuts[CLASSES.index(name)]

@@ -1,4 +1,4 @@
-"""Which objects a measured detector reports at a keyframe, and the errors of their boxes."""
+"""Reports of a measured detector at a keyframe, and the errors of boxes."""
 
 import math
 
@@ -20,7 +20,7 @@ from care_sim.perception.measured.tables import ERRORS, SIGNALS, WIDEST_NORMAL, 
 from care_sim.perception.proxy import count_hits
 
 _WIDEST_M = MATCH_M * (1 - 1e-9)
-"""An error is at most as wide: rounded, a box at just MATCH_M lies beyond."""
+"""Largest error of a centre: slightly below MATCH_M, since rounding could push a box beyond."""
 _RADIAL, _TANGENTIAL, _LENGTH, _WIDTH, _HEIGHT, _YAW = range(len(ERRORS))
 
 
@@ -36,15 +36,15 @@ def report_objects(
     tables: tuple[Recall, Shares, Errors],
     bounds: tuple[float, float],
 ) -> tuple[Integers, Floats, Floats, Integers]:
-    """The rows (k,) of the `present` objects that are reported, their boxes (k, 7) with errors,
-    their scores (k,) within `bounds` and their returns (k,).
+    """Return the rows (k,) of the reported `present` objects, their boxes (k, 7) with errors,
+    scores (k,) within `bounds` and returns (k,).
 
     The `clock` holds the episode's seed and the keyframe. `present` are numbers, classes and rows
-    of memory (n,) of objects with `boxes` (n, 7); `returned` the objects of all returns (P,), the
-    present ones in ascending order, the place of each in it, and how many sweeps the returns are
-    of. Of the `heads` (h,), bounds (h + 1,) say which returns are whose, and angles (h,) what each
-    counts. `gathered` are returns (m, k) at the last keyframes, in the column of the keyframe
-    modulo k, and their weights (k,), newest first.
+    of memory (n,) of objects with `boxes` (n, 7). `returned` are the objects of all returns (P,),
+    the present ones in ascending order, the place of each in it, and the number of sweeps. Of the
+    `heads` (h,), bounds (h + 1,) split the returns by LiDAR, and angles (h,) weigh them. `gathered`
+    are returns (m, k) at the last keyframes, in the column of the keyframe modulo k, and their
+    weights (k,), newest first.
     """
     (seed, keyframe), (objects, classes, places) = clock, present
     hits, ascending, ranks, sweeps = returned
@@ -66,7 +66,7 @@ def report_objects(
         now = usual[ranks[n]] / sweeps
         counts[place, keyframe % kept] = now
         average = now if sweeps > 1 else _average(counts[place], weights, keyframe)
-        # Nothing comes from nothing, though the fitted curve has a share at 0.
+        # Objects without returns are not reported, though the fitted curve has a share at 0.
         if not table.known[label] or now + average <= 0:
             continue
         worth = table.worth[label]
@@ -92,8 +92,8 @@ def report_objects(
 
 @compiled()
 def _average(counts: Floats, weights: Floats, keyframe: int) -> float:
-    """The returns of an object per sweep. At the start there are fewer sweeps than the detector
-    gathers; detectors fill up with those that there are.
+    """Return the object's returns per sweep. At the start there are fewer sweeps than the detector
+    gathers; detectors repeat the available ones.
     """
     total, weight = 0.0, 0.0
     for age in range(min(len(weights), keyframe + 1)):
@@ -104,7 +104,7 @@ def _average(counts: Floats, weights: Floats, keyframe: int) -> float:
 
 @compiled()
 def _at_normal(normal: float, quantiles: Floats) -> float:
-    """The quantile at a standard normal, of quantiles at `NORMALS`, which are evenly spaced."""
+    """Return the quantile at a standard normal, from quantiles at the evenly spaced `NORMALS`."""
     steps = len(quantiles) - 1
     place = (normal + WIDEST_NORMAL) / (2 * WIDEST_NORMAL) * steps
     place = min(max(place, 0.0), float(steps))
@@ -115,7 +115,7 @@ def _at_normal(normal: float, quantiles: Floats) -> float:
 
 @compiled()
 def _misplace(box: Floats, label: int, returns: float, signals: Floats, table: Errors) -> None:
-    """Give a box (7,) of an object with so many `returns` the errors that its `signals` have."""
+    """Add the errors of its `signals` to a box (7,) of an object with this many `returns`."""
     errors = np.empty(len(ERRORS))
     for place in range(len(ERRORS)):
         errors[place] = _at_normal(signals[FIRST_ERROR + place], table.quantiles[label, place])
@@ -131,7 +131,7 @@ def _misplace(box: Floats, label: int, returns: float, signals: Floats, table: E
     box[0] += cos * radial - sin * across
     box[1] += sin * radial + cos * across
 
-    # A box keeps standing on the ground.
+    # A box stays on the ground.
     box[2] -= box[5] / 2
     box[3] *= math.exp(errors[_LENGTH])
     box[4] *= math.exp(errors[_WIDTH])

@@ -22,7 +22,7 @@ CENTRE = ("radial", "tangential")
 ERRORS = (*CENTRE, *SIDES, "yaw")
 """The channels of a box error, in the order of all tables."""
 SIGNALS = ("luck", "turned", *ERRORS)
-"""Numbers of an object that last: its luck, whether its box is turned about, errors of its box."""
+"""Lasting numbers of an object: its luck, whether its box is reversed, errors of its box."""
 WIDEST_NORMAL = 4.0
 _STEPS = 161
 NORMALS = np.linspace(-WIDEST_NORMAL, WIDEST_NORMAL, _STEPS)
@@ -30,14 +30,14 @@ NORMALS = np.linspace(-WIDEST_NORMAL, WIDEST_NORMAL, _STEPS)
 
 
 class Recall(NamedTuple):
-    """The recall formula of all classes, as compiled code takes it; every array has a row or a
-    number per class. See `care_sim.perception.measured.recall`.
+    """The recall formula of all classes, for compiled code. Every array has a row or a number per
+    class. See `care_sim.perception.measured.recall`.
     """
 
     known: Mask
     """Classes that the detector reports at all."""
     worth: Floats
-    """Returns of the detector's own sensor that one return of our full scan is worth."""
+    """Returns of the detector's own sensor per return of our full scan."""
     slope: Floats
     offset: Floats
     spread_slope: Floats
@@ -45,7 +45,7 @@ class Recall(NamedTuple):
     fall: Floats
     """Weight of a return that was there a keyframe ago and is not now."""
     most: Floats
-    """Effective returns above this count as this."""
+    """Largest number of effective returns."""
     shift: Floats
     cuts: Floats
     """(classes, k) the latent score at each of `scores`, infinite where the class has none."""
@@ -54,8 +54,8 @@ class Recall(NamedTuple):
 
 
 class Luck(NamedTuple):
-    """How long each of `SIGNALS` lasts, all (classes, 8): the shares that stay and that decay, and
-    the time of the decay in seconds.
+    """Persistence of `SIGNALS`, all (classes, 8): the shares that stay and that decay, and the time
+    of the decay in seconds.
     """
 
     stays: Floats
@@ -64,9 +64,9 @@ class Luck(NamedTuple):
 
 
 class Errors(NamedTuple):
-    """Errors of boxes: (classes, 6, n) quantiles at `NORMALS`, of the centre for one return, in
-    metres, logarithms of sizes, radians; (classes, 2) the power of returns by which those of the
-    centre shrink; (classes,) the normal below which a box is turned about.
+    """Errors of boxes. (classes, 6, n) quantiles at `NORMALS`: centre in metres for one return,
+    logarithms of sizes, radians. (classes, 2) the power of returns by which errors of the centre
+    shrink. (classes,) the normal below which a box is reversed.
     """
 
     quantiles: Floats
@@ -74,15 +74,15 @@ class Errors(NamedTuple):
     turned_below: Floats
 
     def without(self) -> "Errors":
-        """The table by which every box is true."""
+        """Return a table without errors."""
         nobody = np.full_like(self.turned_below, -np.inf)
         return self._replace(quantiles=np.zeros_like(self.quantiles), turned_below=nobody)
 
 
 class FalseBoxes(NamedTuple):
-    """False boxes of one class: `rates` (k, 2) score and boxes per keyframe within 50 m from it on,
-    shares by ten metres of distance, the share of those that last and their time in seconds, and
-    (3, 2) mean and spread of the logarithms of length, width, height.
+    """False boxes of one class. `rates` (k, 2) are scores and the boxes per keyframe within 50 m
+    from that score on. Then shares by ten metres of distance, the share of lasting ones and their
+    time in seconds, and (3, 2) mean and spread of the logarithms of length, width, height.
     """
 
     label: int
@@ -95,7 +95,7 @@ class FalseBoxes(NamedTuple):
 
 @dataclass(frozen=True)
 class Measurement:
-    """All that was measured of a detector. Scores are the detector's own, before `score_scale`."""
+    """All measured numbers of a detector. Scores are the detector's own, before `score_scale`."""
 
     sweeps: int
     """Sweeps that it gathers."""
@@ -103,12 +103,11 @@ class Measurement:
     """Seconds between the keyframes at which it was measured."""
     score_scale: str
     least_score: float
-    """Nothing is known of lower scores, and none is reported."""
+    """Lowest measured score; lower ones are not reported."""
     most_score: float
     track_score: float
     flash_s: float
-    """How long luck, errors and false boxes last that are new at every measured keyframe: assumed.
-    """
+    """Assumed time of luck, errors and false boxes that are new at every measured keyframe."""
     view_deg: float
     """The horizontal field of view in which false boxes were counted."""
     kept_ahead: float
@@ -141,7 +140,7 @@ def measurement(name: str) -> Measurement:
 
 
 def _lent(table: dict[str, Any]) -> dict[str, Any]:
-    """The rows by class; a class that is `as` another takes what it does not have from it."""
+    """Return the rows by class; a class with `as` takes missing numbers from that class."""
     return {name: table.get(row.get("as"), {}) | row for name, row in table.items()}
 
 
@@ -172,7 +171,7 @@ def _recall(rows: dict[str, Any]) -> Recall:
 
 
 def _luck(rows: dict[str, Any], errors: dict[str, Any]) -> Luck:
-    # Whether a box is turned about lasts as its yaw does.
+    # A reversed box lasts as its yaw does.
     parts = [rows] + [
         {name: row[error] for name, row in errors.items()} for error in ("yaw", *ERRORS)
     ]

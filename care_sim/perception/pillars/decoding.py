@@ -1,4 +1,4 @@
-"""From what the network answers to boxes: peaks, the box that each tells of, one body a place."""
+"""Decode the network's output to boxes: find peaks, read their boxes, keep one body per place."""
 
 from typing import NamedTuple
 
@@ -12,9 +12,9 @@ from care_sim.perception.pillars.network import cell_centres
 
 
 @compiled()
-def one_a_place(boxes: Floats) -> Mask:
-    """(n,) which of boxes (n, 7), the surest first, stay: two bodies do not share a place, so of
-    two of which one holds the other's centre in plan the surer stays.
+def drop_overlaps(boxes: Floats) -> Mask:
+    """Return (n,) which of boxes (n, 7), the surest first, stay. Two bodies do not share a place:
+    if a box holds another's centre in plan, the surer one stays.
     """
     kept = np.ones(len(boxes), np.bool_)
     for i in range(len(boxes)):
@@ -30,7 +30,7 @@ def one_a_place(boxes: Floats) -> Mask:
 
 @compiled()
 def points_within(points: Floats, boxes: Floats) -> Integers:
-    """(n,) how many of points (P, 3) lie in each of boxes (n, 7)."""
+    """Return (n,) the number of points (P, 3) in each of boxes (n, 7)."""
     counts = np.zeros(len(boxes), np.int64)
     for i in range(len(boxes)):
         cos, sin = np.cos(boxes[i, 6]), np.sin(boxes[i, 6])
@@ -38,7 +38,7 @@ def points_within(points: Floats, boxes: Floats) -> Integers:
         reach = np.hypot(half_length, half_width)
         for p in range(len(points)):
             dx = points[p, 0] - boxes[i, 0]
-            # Most points are far from most boxes: one comparison sends them away.
+            # Most points are far from most boxes: one comparison excludes them.
             if abs(dx) > reach:
                 continue
             dy, dz = points[p, 1] - boxes[i, 1], points[p, 2] - boxes[i, 2]
@@ -58,15 +58,15 @@ def _holds(box: Floats, x: float, y: float) -> bool:
 
 
 MOST_PEAKS = 300
-"""The surest that are looked at; a street has 30 objects in range."""
+"""Number of peaks used, the surest first; a street has 30 objects in range."""
 SMALLEST_M, LARGEST_M = 0.2, 25.0
-"""What a length, a width or a height may be, whatever was learned."""
+"""Bounds of a length, a width or a height."""
 
 
 class Peaks(NamedTuple):
-    """Where a class is likelier than in the eight cells around, the surest first: `classes` (n,),
-    `logits` (n,) as the network has them, `scores` (n,) from 0 to 1, `boxes` (n, 7) in the sensor
-    frame.
+    """Peaks of classes: cells where a class is likelier than in the eight cells around, the surest
+    first. `classes` (n,), the network's `logits` (n,), `scores` (n,) from 0 to 1, `boxes` (n, 7) in
+    the sensor frame.
     """
 
     classes: Integers
@@ -82,8 +82,8 @@ class Peaks(NamedTuple):
 def peaks_of(
     answer: NDArray[np.float32], sensor_height_m: float, calibration: Floats, least_score: float
 ) -> Peaks:
-    """The peaks of an answer (OUTPUTS, CELLS, CELLS) of a network
-    (`care_sim.perception.pillars.network`) whose scores are `least_score` or more, one a place.
+    """Return the peaks of a network's output (OUTPUTS, CELLS, CELLS) with scores of `least_score`
+    or more, one per place (`care_sim.perception.pillars.network`).
 
     `calibration` (classes, 2) holds slopes and offsets from logits to those of scores.
     """
@@ -92,13 +92,13 @@ def peaks_of(
     logits = sure[classes, rows, columns].astype(np.float64)
     scores = score(calibration, classes, logits)
 
-    # Stable, so that of equally sure ones the first class and the first cell come first.
+    # Stable, so that equally sure peaks stay in the order of classes and cells.
     order = np.argsort(-scores, kind="stable")[:MOST_PEAKS]
     order = order[scores[order] >= least_score]
     rows, columns = rows[order], columns[order]
     boxes = _boxes(answer[len(CLASSES) :, rows, columns], rows, columns)
     boxes[:, 2] -= sensor_height_m
-    return Peaks(classes[order], logits[order], scores[order], boxes).take(one_a_place(boxes))
+    return Peaks(classes[order], logits[order], scores[order], boxes).take(drop_overlaps(boxes))
 
 
 def score(calibration: Floats, classes: Integers, logits: Floats) -> Floats:
@@ -109,7 +109,9 @@ def score(calibration: Floats, classes: Integers, logits: Floats) -> Floats:
 
 
 def _highest_around(planes: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(n, h, w) the highest of every cell of `planes` (n, h, w) and the eight around it."""
+    """Return (n, h, w) the highest value of every cell of `planes` (n, h, w) and the eight around
+    it.
+    """
     edged = np.pad(planes, ((0, 0), (1, 1), (1, 1)), constant_values=-np.inf)
     rows = np.maximum(np.maximum(edged[:, :-2], edged[:, 1:-1]), edged[:, 2:])
     highest: NDArray[np.float32] = np.maximum(rows[..., :-2], rows[..., 1:-1])
@@ -122,7 +124,7 @@ def _boxes(told: NDArray[np.float32], rows: Integers, columns: Integers) -> Floa
     middles_x, middles_y = cell_centres()
     sizes = np.exp(np.clip(log_sizes, np.log(SMALLEST_M), np.log(LARGEST_M)))
 
-    # The axis, and of its two ways the one that the direction leans to.
+    # The axis, in the way that the direction leans to.
     yaw = np.arctan2(sin2, cos2) / 2
     backwards = np.cos(yaw) * cos + np.sin(yaw) * sin < 0
     yaw = np.where(backwards, yaw + np.where(yaw > 0, -np.pi, np.pi), yaw)

@@ -1,4 +1,4 @@
-"""A learned detector that sees points only: a network over pillars, trained on scans of every
+"""A learned detector that reads only points: a network over pillars, trained on scans of every
 budget.
 """
 
@@ -23,11 +23,11 @@ from care_sim.perception.pillars.decoding import peaks_of, points_within
 from care_sim.perception.pillars.network import Fixed, answers, on_plan, place_planes, shapes
 
 FORMAT = "care-sim pillars 1"
-"""It goes up when the layers or what they are told change."""
+"""Version of the format; raise it when layers or inputs change."""
 SHIPPED = Path(__file__).parent / "shipped" / "pillars.npz"
 STREETS, CLUTTER = "streets", "clutter"
 WEIGHTS = {STREETS: SHIPPED, CLUTTER: SHIPPED.with_name("pillars-clutter.npz")}
-"""The shipped weights by what they learned from: clean streets and drives, or cluttered streets."""
+"""The shipped weights by training data: clean streets and drives, or cluttered streets."""
 CALIBRATION = "calibration"
 """(classes, 2) slope and offset from the logit of a peak to that of its score."""
 COMMAND = "care-sim train detector"
@@ -41,7 +41,7 @@ def save_detector(
 
 
 def load_detector(path: str | PathLike[str] | None = None) -> tuple[Arrays, dict[str, Any]]:
-    """The arrays and the card of a file, of the shipped one without a path.
+    """Return the arrays and the card of a file, by default of the shipped one.
 
     Raises InvalidInput for a file that is missing, damaged, or does not hold exactly these arrays.
     """
@@ -74,17 +74,18 @@ def _card(text: str) -> dict[str, Any]:
 
 
 LEAST_SCORE = 0.3
-"""What is less sure does not become a track."""
+"""Score below which a detection does not become a track."""
 
 
 class PillarsDetector:
-    """The learned detector. `weights` are shipped ones, `streets` or `clutter`, after what they
-    learned from; `file` holds others that `care-sim train detector` wrote, in their place.
+    """The learned detector. `weights` are shipped ones, `streets` or `clutter`, named after their
+    training data. `file` replaces them by weights that `care-sim train detector` wrote.
 
-    What it reports has a score of `least_score` or more. A score is the share of such boxes that
-    lie within 2 m of an object of their class, in scenes apart from those of the training. Runs on
-    one core with PyTorch, the extra `rl`. Raises MissingExtra without it, InvalidInput for a file
-    that is not of such weights.
+    Boxes have a score of `least_score` or more. A score is the share of such boxes within 2 m of an
+    object of their class, in scenes outside the training. Runs on one core with PyTorch, the extra
+    `rl`.
+
+    Raises MissingExtra without it, InvalidInput for a file that is not of such weights.
     """
 
     far = False
@@ -122,8 +123,8 @@ class PillarsDetector:
         return Detections(found.classes, found.boxes, returns, found.scores)
 
     def answer(self, points: Floats, sensor_height_m: float) -> NDArray[np.float32]:
-        """(OUTPUTS, CELLS, CELLS) what the network says of points (P, 3). Raises InvalidInput where
-        that is not finite.
+        """Return (OUTPUTS, CELLS, CELLS) the network's output for points (P, 3). Raises
+        InvalidInput if it is not finite.
         """
         torch = self._torch
         seen = on_plan(points, sensor_height_m)
@@ -132,8 +133,8 @@ class PillarsDetector:
             inputs, pillars = torch.from_numpy(seen.inputs), torch.from_numpy(seen.pillars)
             answer = answers(torch, self._network, inputs, pillars, self._places)
         made: NDArray[np.float32] = answer[0].numpy()
-        # Weights may each be small enough, and their products still overflow. Nothing is a peak
-        # beside NaN, so the scan would look empty.
+        # Products of small weights may still overflow. No cell is a peak beside NaN, so the scan
+        # would look empty.
         if not np.isfinite(made).all():
             raise InvalidInput(f"weights {self._file}: the network answers numbers beyond float32")
         return made

@@ -1,7 +1,7 @@
-"""The network: a table of its layers, and the one way through them, in plain PyTorch.
+"""The network in plain PyTorch: a table of its layers, and the pass through them.
 
-What a layer does is handed in: to train it normalises over a batch, to detect its numbers are
-fixed. So both go the same way.
+The operation of a layer is an argument. Training normalises over a batch; detection uses fixed
+numbers. Both share the same pass.
 """
 
 from collections.abc import Callable
@@ -15,23 +15,25 @@ from care_sim.core.arrays import Floats
 from care_sim.core.types import CLASSES
 
 PILLAR_M = 0.5
-"""The side of a pillar: a person covers one, a car some thirty."""
+"""Side of a pillar: a person covers one, a car about thirty."""
 PILLARS = 208
-"""Along each side of the plan, the sensor in its middle: 52 m each way, a range of 50 m and half a
-car. It can be halved four times."""
+"""Pillars along each side of the plan, with the sensor in its middle: 52 m each way, a range of 50
+m and half a car. The number can be halved four times.
+"""
 CELL_M = 2 * PILLAR_M
-"""The side of a cell in which the network answers."""
+"""Side of an output cell."""
 CELLS = PILLARS // 2
 REACH_M = PILLAR_M * PILLARS / 2
 OWN_ROOF_M = 2.0
-"""Nearer to the sensor than this there is the roof that carries it."""
+"""Range within which returns are the car's own roof."""
 LOWEST_M, HIGHEST_M = -1.0, 4.5
 """Heights above the road between which points count: a road that falls away, and the highest bus.
 """
 POINT_INPUTS = ("dx", "dy", "height", "low", "range", "cos", "sin", "z")
-"""What is told of a point: its place in its pillar (sides at -1 and 1); its height above the road,
-metres; the same up to 0.5 m, twice over, since a kerb differs from a foot by little; its planar
-range over REACH_M; cosine and sine of its bearing; z in the sensor frame, metres."""
+"""Inputs per point. Place in its pillar (sides at -1 and 1). Height above the road, metres. The
+same up to 0.5 m, doubled, since a kerb differs little from a foot. Planar range over REACH_M.
+Cosine and sine of its bearing. Height z in the sensor frame, metres.
+"""
 _LOW_M = 0.5
 
 
@@ -45,8 +47,8 @@ class Points(NamedTuple):
 
 
 def on_plan(points: Floats, sensor_height_m: float) -> Points:
-    """What the network is told of points (P, 3) in the sensor frame; those off the plan are left
-    out.
+    """Return the network's inputs for points (P, 3) in the sensor frame. Points off the plan are
+    left out.
     """
     x, y, z = points[:, :3].T
     height = z + sensor_height_m
@@ -73,15 +75,17 @@ def cell_centres() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
 BOX_OUTPUTS = (
     "x", "y", "height", "log length", "log width", "log height", "cos", "sin", "cos 2", "sin 2",
 )  # fmt: skip
-"""What a cell says of the box whose centre is near: x and y from the middle of the cell, the height
-of its centre above the road, metres; the logarithms of its size; its yaw as a direction, and as an
-axis. An axis is what points tell; which way along it they seldom do, and the direction is then
-short, but the axis is not."""
+"""Outputs of a cell for the box whose centre is near. Place: x and y from the middle of the cell,
+and height of the centre above the road, metres. Then logarithms of the size, and yaw as a direction
+and as an axis. Points show the axis, but seldom the way along it. The direction is then short, but
+the axis is not.
+"""
 OUTPUTS = len(CLASSES) + len(BOX_OUTPUTS)
 
 _PLACES = 3
-"""What every pillar is told of its place: range, and cosine and sine of its bearing. The side of a
-body that faces the sensor returns, so where its middle lies hangs on the bearing."""
+"""Inputs per pillar: range, and cosine and sine of its bearing. Only the side of a body that faces
+the sensor returns, so the place of its middle depends on the bearing.
+"""
 
 
 @dataclass(frozen=True)
@@ -106,27 +110,28 @@ _STAGES = (
     (Layer("lane0", 64, 96, stride=2), Layer("lane1", 96, 96), Layer("lane2", 96, 96)),
     (Layer("street0", 96, 128, stride=2), Layer("street1", 128, 128), Layer("street2", 128, 128)),
 )
-"""Of cells of 1, 2, 4 and 8 m."""
+"""Stages with cells of 1, 2, 4 and 8 m."""
 _BACK = (
     (Layer("lane_back", 128, 96, 1), Layer("lane_both", 96, 96)),
     (Layer("body_back", 96, 64, 1), Layer("body_both", 64, 64)),
     (Layer("near_back", 64, 32, 1), Layer("near_both", 32, 32)),
 )
-"""What a coarser stage tells the finer one before it, and what that makes of both."""
+"""Layers that pass a coarser stage to the finer one before it, and combine both."""
 _ANSWER = Layer("answer", 32, OUTPUTS, 1, rectified=False)
 PLAN_LAYERS = (*(one for stage in (*_STAGES, *_BACK) for one in stage), _ANSWER)
 LAYERS = {layer.name: layer for layer in (*POINT_LAYERS, *PLAN_LAYERS)}
 
 Apply = Callable[[str, Any], Any]
-"""What a layer does, by its name: to rows (n, inputs) of points, to planes (s, inputs, h, w) of the
-plan."""
+"""Applies a layer by name, to rows (n, inputs) of points or to planes (s, inputs, h, w) of the
+plan.
+"""
 
 
 def answers(
     torch: Any, apply: Apply, inputs: Any, pillars: Any, places: Any, scans: int = 1
 ) -> Any:
-    """(scans, OUTPUTS, CELLS, CELLS): of each class how sure it is, as a logit, that a centre lies
-    in the cell, then BOX_OUTPUTS.
+    """Return (scans, OUTPUTS, CELLS, CELLS): the logit of a centre in the cell per class, then
+    BOX_OUTPUTS.
 
     `inputs` (p, len(POINT_INPUTS)) and `pillars` (p,) are the `Points` of all scans, the pillars of
     scan s counted on from s * PILLARS**2. `places` are `place_planes`.
@@ -135,8 +140,8 @@ def answers(
     for layer in POINT_LAYERS:
         told = apply(layer.name, told)
 
-    # The mean of its points, and how many they are: a pillar in which few cells fired looks like
-    # one in which many did.
+    # The mean of its points, and their number: otherwise pillars with few fired cells look like
+    # those with many.
     size = scans * PILLARS**2
     counts = torch.zeros(size, 1).index_add_(0, pillars, torch.ones(len(pillars), 1))
     means = torch.zeros(size, told.shape[1]).index_add_(0, pillars, told) / counts.clamp(min=1)
@@ -155,7 +160,7 @@ def answers(
 
 
 def place_planes(torch: Any) -> Any:
-    """(1, 3, PILLARS, PILLARS) what every pillar is told of its place."""
+    """Return (1, 3, PILLARS, PILLARS) the inputs per pillar."""
     along = ((np.arange(PILLARS) + 0.5) / PILLARS * 2 - 1).astype(np.float32)
     x, y = along[:, None], along[None, :]
     ranges = np.hypot(x, y)
@@ -173,7 +178,7 @@ def shapes() -> dict[str, tuple[int, ...]]:
 
 
 class Fixed:
-    """What the layers do with fixed numbers: `arrays` by the names of `shapes`."""
+    """Layers with fixed numbers: `arrays` by the names of `shapes`."""
 
     def __init__(self, torch: Any, arrays: dict[str, Any]):
         self._do = torch.nn.functional

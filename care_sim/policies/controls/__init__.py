@@ -1,1 +1,1 @@
-"""Policies that nobody should mistake for contenders: they show what a number may hang on."""
+"""Controls: policies that are no contenders, and show what a result depends on."""

@@ -1,4 +1,4 @@
-"""Controls that see no camera: a fixed pattern beside the cells of tracks."""
+"""Controls without a camera: a fixed pattern beside the cells of tracks."""
 
 from collections.abc import Mapping
 from os import PathLike
@@ -14,7 +14,7 @@ from care_sim.policies.own.care import CORE_FIRST, Round
 
 
 class HistoryPattern(Policy):
-    """The hulls of the history policy; the reserve goes to what a `pattern` asks for."""
+    """History, with the reserve spent on a `pattern`."""
 
     keeps_order = True
 
@@ -23,13 +23,13 @@ class HistoryPattern(Policy):
         self._pattern = pattern
 
     def demand(self, belief: Belief) -> Demand:
-        """Hulls, then the pattern."""
+        """Return the hulls, then the pattern."""
         hulls = self.rig.listed(self.rig.hulls(belief.tracks.boxes))
         return Demand(hulls, self._pattern.demand(belief).layers)
 
 
 class HistoryPlace(HistoryPattern):
-    """The hulls of the history policy; the reserve goes to the map of `place`."""
+    """History, with the reserve spent on the map of `place`."""
 
     name = "history-place"
     tags = ("causal", "learned", "control")
@@ -40,8 +40,8 @@ class HistoryPlace(HistoryPattern):
 
 
 class HistoryRows(HistoryPattern):
-    """The hulls of the history policy; the reserve goes to the rows at which things enter the
-    range. What CARE must beat to show that its camera matters.
+    """History, with the reserve spent on the rows at which objects enter the range. CARE must beat
+    it to show that its camera matters.
     """
 
     name = "history-rows"
@@ -53,16 +53,17 @@ class HistoryRows(HistoryPattern):
 
 
 MAP_SHARE = 0.35
-"""Share of the budget that the map has before any track is served. First tried on the streets 0 to
-19, which are scored."""
+"""Share of the budget for the map, before any track. First tried on the streets 0 to 19, which are
+scored.
+"""
 
 
 class PlaceHulls(Policy):
     """The likeliest cells of the map `place`, then a few cells of every hull.
 
-    `MAP_SHARE` of the budget goes to the likeliest cells of the map `place`, then two rounds of a
-    few cells to every hull, the undilated core first as in `care-spread`; what is left goes on
-    down the map. What a camera must beat in a policy that serves its tracks as sparingly.
+    `MAP_SHARE` of the budget goes to the likeliest cells of the map `place`. Two rounds give a few
+    cells to every hull, the undilated core first as in `care-spread`. The rest continues down the
+    map. A camera policy that serves tracks equally sparingly must beat it.
 
     `path` is a map as for `place`.
     """
@@ -84,7 +85,9 @@ class PlaceHulls(Policy):
         self._map = likeliest_cells(rig, path)
 
     def demand(self, belief: Belief) -> Demand:
-        """Layers: the top of the map, a round of hulls, another one, and the map again."""
+        """Return the layers: the top of the map, a round of hulls, another one, and the map
+        again.
+        """
         hulls = self.rig.hulls(belief.tracks.boxes)
         few = self.rig.listed(hulls, CORE_FIRST, 2 * self._round)
         return Demand(

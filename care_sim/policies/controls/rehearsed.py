@@ -1,5 +1,5 @@
-"""Controls that have played this very scenario before: in training seeds to learn where it hides
-its actor, or in the seed that is played.
+"""Controls that know the scenario: from training seeds, where it hides its actor, or from the
+played seed itself.
 """
 
 from collections.abc import Mapping
@@ -30,11 +30,11 @@ from care_sim.scenarios.base import Scenario
 from care_sim.world.world import World
 
 FALLBACK_SCENARIO = "dense"
-"""What is rehearsed where no scenario is told, as in the open loop."""
+"""Scenario rehearsed by default, as in the open loop."""
 
 
 def known_scenario(told: Scenario | str | None) -> Scenario:
-    """The scenario of the environment, or one by name with its default arguments.
+    """Return the environment's scenario, or a named one with its default arguments.
 
     Raises InvalidInput for an unknown name.
     """
@@ -46,26 +46,27 @@ def known_scenario(told: Scenario | str | None) -> Scenario:
 
 
 def rehearsal(scenario: Scenario, seed: int, rig: Rig) -> OneWorld:
-    """The episode of a seed before its first keyframe, as an environment without faults builds it.
+    """Return the episode of a seed before its first keyframe, as an environment without faults
+    builds it.
 
     The caller closes its world.
     """
     seeds = EpisodeSeeds.of(seed)
     world = scenario.make_world(np.random.default_rng(seeds.scenario))
-    # A rig that was made alone may have no camera; the scenario's environment has these.
+    # A rig made without an environment may have no camera; the scenario's environment has these.
     equipped = rig if rig.cameras else replace(rig, cameras=scenario.cameras)
     given = equipped, ClosedLoopConditions(), seeds.sensors, scenario.duration_s
     return OneWorld.begun(world, *given)
 
 
 class LearnedPlace(Pattern):
-    """Fires the cells in which this very scenario hid its actor in other seeds.
+    """Fires the cells in which the same scenario hid its actor in other seeds.
 
-    They are those in which a full scan first detected the first-sighting actor in the first `seeds`
+    In these cells a full scan first detected the first-sighting actor, in the first `seeds`
     training seeds of the scenario.
 
-    `make_policy` tells it the `scenario` of the environment, with its parameters. Raises
-    InvalidInput for an unknown scenario.
+    `make_policy` passes the environment's `scenario`, with its parameters. Raises InvalidInput for
+    an unknown scenario.
     """
 
     name = "learned-place"
@@ -78,12 +79,12 @@ class LearnedPlace(Pattern):
 
 
 def learned_cells(rig: Rig, scenario: Scenario | str | None, seeds: int) -> Cells:
-    """(N,) all cells, those first in which most of the actors were found.
+    """Return (N,) all cells, those with most detected actors first.
 
     Raises InvalidInput for an unknown scenario, or `seeds` beyond 1 to 1,000.
     """
     check_whole("seeds", seeds, 1, 1000)
-    # All budgets share a map: it is learned with a full scan.
+    # All budgets share a map, learned with a full scan.
     return _learned(replace(rig, budget=rig.grid.size), known_scenario(scenario), seeds)
 
 
@@ -97,15 +98,15 @@ def _learned(rig: Rig, scenario: Scenario, seeds: int) -> Cells:
 
 
 def _first_hull(rig: Rig, scenario: Scenario, seed: int) -> Cells:
-    """The hull of the first-sighting actor at the first keyframe at which a full scan detects it;
-    no cell if it never does.
+    """Return the hull of the first-sighting actor at its first detection by a full scan; no cells
+    without one.
     """
     everything = np.arange(rig.grid.size)
     loop = rehearsal(scenario, seed, rig)
     with closing(loop.world) as world:
         over = False
         while (target := world.first_sighting) and not over:
-            # Where the actor is at the scan: the keyframe moves the world on.
+            # The actor's place at the scan: the keyframe moves the world on.
             boxes = loop.sensor.boxes_to_local(loop.world.boxes([target]))
             record = loop.keyframe(everything)
             if record.detected:
@@ -117,8 +118,8 @@ def _first_hull(rig: Rig, scenario: Scenario, seed: int) -> Cells:
 
 
 class HistoryLearnedPlace(HistoryPattern):
-    """The hulls of the history policy; the reserve goes to the map of `learned-place`, of which it
-    has the parameters.
+    """History, with the reserve spent on the map of `learned-place`, with that policy's
+    parameters.
     """
 
     name = "history-learned-place"
@@ -131,30 +132,29 @@ class HistoryLearnedPlace(HistoryPattern):
 
 
 class SeedFinder(Policy):
-    """A warning: it finds the seed by the first observation and knows the episode from then on.
+    """A warning: finds the seed by the first observation and then knows the episode.
 
-    Of the first `seeds` seeds of a public
-    `scenario` it takes the one whose ego begins at the speed that it reads, and of several such the
-    one whose first picture it sees. It lets a twin of that episode's world go on beside it, its ego
-    driven as the own car drives, and reserves the hulls of where all who come out of hiding are by
-    then. It needs no return. It plays as history does if no seed that it knows begins at that
-    speed: with a seed beyond `seeds`, a `secret` of the environment, or noise of the speed.
+    Among the first `seeds` seeds of a public `scenario` it takes the seed with the observed initial
+    speed. If several match, the first picture decides. It simulates a twin of that episode's world,
+    drives the twin's ego like its own car, and reserves the hulls of all hidden actors in the twin.
+    It needs no return. If no known seed has the speed, it plays like history: with a seed beyond
+    `seeds`, a `secret` of the environment, or noise of the speed.
 
-    `make_policy` tells it the `scenario` of the environment, with its parameters. Made of a rig
-    alone it takes `dense`. In another scenario than it is given by name the first speed can be the
-    same. It then finds the seed, and fires where they would be in the scenario that it knows.
+    `make_policy` passes the environment's `scenario`, with its parameters. Made with only a rig, it
+    takes `dense`. Different scenarios can share an initial speed. With the wrong scenario it may
+    find the seed, and fires at the actors of the scenario that it has.
 
-    With `hidden_first` it asks for these hulls before anything else and gives its tracks what is
-    left. It knows nothing of the traffic, so that in drives others may hit less.
+    With `hidden_first` it demands these hulls first and gives its tracks the rest. It ignores the
+    traffic, so others may collide less in drives.
 
-    It is a control, no contender: what it reaches without a camera is what the seeds give away.
+    It is a control, no contender: it shows how much the seeds reveal without a camera.
     """
 
     name = "seed-finder"
     tags = ("generator", "control")
     source = "own: what public seeds give away"
     told: ClassVar[Mapping[str, str]] = {"scenario": "scenario"}
-    """A rig does not say through which scenario it drives, and scenarios share first speeds."""
+    """A rig does not name its scenario, and scenarios share initial speeds."""
 
     def __init__(
         self,
@@ -175,27 +175,27 @@ class SeedFinder(Policy):
     def reset(self) -> None:
         """Forget the episode."""
         self.found: int | None = None
-        """The seed that fits the first observation; None if there is none."""
+        """The seed that fits the first observation, None without one."""
         if self._twin is not None:
             self._twin.close()
         self._twin = None
         self._speed: float | None = None
 
     def remember(self, belief: Belief) -> None:
-        """Find the seed by what is seen first, then let its twin follow the car."""
+        """Find the seed by the first observation, then let the twin follow the car."""
         speed = belief.ego.speed
         if self._speed is None:
             self.found = self._seed_of(belief)
             if self.found is not None:
                 self._twin = rehearsal(self._scenario, self.found, self.rig).world
         elif self._twin is not None:
-            # Between keyframes the car holds one acceleration, which both speeds tell.
+            # Between keyframes the car holds one acceleration, which follows from both speeds.
             held = (speed - self._speed) / self.rig.keyframe_s
             self._twin.advance(held, self.rig.keyframe_s)
         self._speed = speed
 
     def demand(self, belief: Belief) -> Demand:
-        """Hulls of tracked objects, then of hidden ones."""
+        """Return the hulls of tracked objects, then of hidden ones."""
         tracked = self.rig.hulls(belief.tracks.boxes)
         hidden = self.rig.hulls(self._expected())
         if self._hidden_first:
@@ -203,7 +203,7 @@ class SeedFinder(Policy):
         return Demand(tracked, [hidden])
 
     def _seed_of(self, belief: Belief) -> int | None:
-        # All budgets share what is seen first.
+        # The first observation is the same for all budgets.
         rig = replace(self.rig, budget=self.rig.grid.size)
         seen = _picture(belief)
         alike: int | None = None
@@ -212,13 +212,13 @@ class SeedFinder(Policy):
             if speed == belief.ego.speed:
                 if picture == seen:
                     return seed
-                # A camera with faults shows another picture: then the speed alone has to do.
+                # A camera with faults shows another picture: then only the speed decides.
                 alike = seed if alike is None else alike
         return alike
 
     def _expected(self) -> Floats:
-        """(n, 7) boxes in the sensor frame of all who come out of hiding, ahead and within the
-        sensor's reach; none if not known.
+        """Return (n, 7) boxes in the sensor frame of all hidden actors, ahead and within the
+        sensor's reach; none if unknown.
         """
         if self._twin is None:
             return np.empty((0, 7))
@@ -227,19 +227,19 @@ class SeedFinder(Policy):
             hidden.add(self._twin.first_sighting.body)
         sensor = Frame.mounted(self._twin.ego.pose, self.rig.sensor_position)
         boxes = sensor.boxes_to_local(self._twin.boxes_of(np.array(sorted(hidden), np.int64)))
-        # Who was passed, or is too far to be detected, would take the cells of who matters.
+        # Actors that were passed or are too far to detect would take the cells of relevant ones.
         near = planar_ranges(boxes) <= self.rig.grid.range_m
         return np.asarray(boxes[near & (boxes[:, 0] > 0)])
 
 
 @lru_cache(maxsize=10_000)
 def _first_look(scenario: Scenario, seed: int, rig: Rig) -> tuple[float, bytes]:
-    """Speed and picture with which the episode of a seed begins, as an observation holds them."""
+    """Return the initial speed and picture of a seed's episode, as an observation holds them."""
     loop = rehearsal(scenario, seed, rig)
     with closing(loop.world):
         return float(np.float32(loop.belief.ego.speed)), _picture(loop.belief)
 
 
 def _picture(belief: Belief) -> bytes:
-    """The camera's boxes, as an observation holds them: in float32."""
+    """Return the camera's boxes as an observation holds them, in float32."""
     return belief.detections.rows().astype(np.float32).tobytes()

@@ -1,1 +1,1 @@
-"""Policies with trained weights, and what they see of a belief."""
+"""Policies with trained weights, and their inputs from a belief."""

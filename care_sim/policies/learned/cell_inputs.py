@@ -39,26 +39,26 @@ class ScanRules(NamedTuple):
     """Rules by which a return counts as above the road, and how far its surroundings reach."""
 
     reach_m: np.float32
-    """The longest range; a ray that returns nothing reads it."""
+    """The longest range, which a ray without a return reads."""
     clearance_m: np.float32
-    """How high above the sensor a return must be."""
+    """Least height of a return above the sensor."""
     margin_columns: int
     margin_rows: int
     turn: int
-    """How many columns a whole turn has; the grid may have fewer."""
+    """Columns of a whole turn; the grid may have fewer."""
 
 
 class RigTerms(NamedTuple):
     """Inputs of the network that stay the same while the rig does."""
 
     hidden: CellNumbers
-    """(N, h) what enters the hidden units."""
+    """(N, h) inputs of the hidden units."""
     unmarked: CellNumbers
     """(N,) the output of a cell without a mark."""
 
 
 class MarkWeights(NamedTuple):
-    """The weights into the hidden units of what a keyframe shows."""
+    """The weights from a keyframe's inputs to the hidden units."""
 
     by_code: CellNumbers
     """(256, h) for every code of marks."""
@@ -72,9 +72,9 @@ class MarkWeights(NamedTuple):
 def mark_sets(codes: Codes, sizes: CellNumbers, cells: Cells, ends: Cells, marks: Codes) -> None:
     """Give the cells of sets the marks (s,) of their sets.
 
-    The sets lie one after the other in `cells` and end at `ends` (s,). `sizes` (N,) becomes log2 of
-    the cells of the smallest MARK_UNEXPLAINED set that a cell lies in, over 10. That set also
-    decides whether the cell is MARK_SMALL.
+    The sets are concatenated in `cells` and end at `ends` (s,). `sizes` (N,) becomes log2 of the
+    number of cells, over 10, of a cell's smallest MARK_UNEXPLAINED set. That set also decides
+    whether the cell is MARK_SMALL.
     """
     start = 0
     for n, end in enumerate(ends):
@@ -85,7 +85,7 @@ def mark_sets(codes: Codes, sizes: CellNumbers, cells: Cells, ends: Cells, marks
             if not marks[n] & MARK_UNEXPLAINED:
                 codes[cell] = code | marks[n]
             elif not code & MARK_UNEXPLAINED or size < sizes[cell]:
-                # The smaller set replaces what the larger one said of its class.
+                # The smaller set overrides the class mark of the larger one.
                 codes[cell] = (code & ~MARK_SMALL) | marks[n]
                 sizes[cell] = size
         start = end
@@ -99,11 +99,11 @@ def mark_scan(
     heights: CellNumbers,
     rules: ScanRules,
 ) -> None:
-    """Mark the cells that the last scan `ranges` (E, A) fired, what stood there, and its
+    """Mark the cells that the last scan `ranges` (E, A) fired, standing returns, and their
     surroundings. Write the `nearnesses` (N,) of returns, 1 at the sensor and 0 at the reach.
 
-    `heights` (N,) are those of unit rays. Nothing in a hull counts as standing, since its track
-    explains it: hulls are marked before the scan.
+    `heights` (N,) are those of unit rays. Returns in a hull do not count as standing, since its
+    track explains them: hulls are marked before the scan.
     """
     rows, columns = ranges.shape
     for row in range(rows):
@@ -112,7 +112,7 @@ def mark_scan(
             distance = ranges[row, column]
             if distance <= 0:
                 continue
-            # A ray without a return reads the reach, and so has the nearness 0.
+            # A ray without a return reads the reach, so its nearness is 0.
             codes[cell] |= MARK_FIRED
             nearnesses[cell] = 1 - distance / rules.reach_m
             if (
@@ -121,7 +121,7 @@ def mark_scan(
                 and not codes[cell] & MARK_HULL
             ):
                 codes[cell] |= MARK_STANDING
-                # Columns go round the car, where the grid does; rows end at top and bottom.
+                # Columns wrap around if the grid does; rows end at top and bottom.
                 first = max(row - rules.margin_rows, 0)
                 last = min(row + rules.margin_rows + 1, rows)
                 for near in range(first, last):
@@ -141,15 +141,15 @@ def network_scores(
     weights: MarkWeights,
     out: CellNumbers,
 ) -> CellNumbers:
-    """(N,) the output of the network for every cell.
+    """Return (N,) the output of the network for every cell.
 
-    `codes`, `sizes` and `nearnesses` (N,) are what a keyframe shows. Hidden units are rectified and
-    weighed by `out` (h,).
+    `codes`, `sizes` and `nearnesses` (N,) are the keyframe's inputs. Hidden units are rectified and
+    weighted by `out` (h,).
     """
     scores = rig.unmarked.copy()
     units = np.empty_like(out)
     for n, code in enumerate(codes):
-        # Most cells have no mark: theirs is the output that was computed with the rig.
+        # Most cells have no mark: their output was computed with the rig.
         if code:
             size = sizes[n]
             near = nearnesses[n]
@@ -161,7 +161,7 @@ def network_scores(
                     + near * weights.by_nearness[h]
                 )
                 units[h] = max(unit, np.float32(0)) * out[h]
-            # One sum over all units, in NumPy's order: published scores hang on it.
+            # One sum over all units, in NumPy's order: published scores depend on it.
             scores[n] = units.sum()
     return scores
 
@@ -176,10 +176,11 @@ CELL_MARKS = (
     "returned by it from above the road, and in no hull",
     "within the margins of such a cell",
 )
-"""What is true or not of a cell at a keyframe: the bits of its code, the lowest first."""
+"""Marks of a cell at a keyframe: the bits of its code, the lowest first."""
 SCAN_INPUTS = len(CELL_MARKS) + 2
-"""The marks; log2 of the cells of the unexplained wedge over 10; nearness of the last return, 1 at
-the sensor, 0 at the range of a ray and without a return."""
+"""Inputs per keyframe: the marks; log2 of the unexplained wedge's cells over 10; nearness of the
+last return, 1 at the sensor, 0 at the reach and without a return.
+"""
 RIG_INPUTS = (
     "elevation over half a radian",
     "nearness of the road",
@@ -187,8 +188,8 @@ RIG_INPUTS = (
     "abs sin azimuth",
     "in a picture",
 )
-"""What is known of a cell once the rig is. Left and right are alike, so that 20 scenes teach no
-side.
+"""Inputs of a cell that depend only on the rig. Left and right are symmetric, so that 20 scenes
+teach no side.
 """
 
 _SMALL_CLASSES = np.isin(CLASSES, ("pedestrian", "bicycle"))
@@ -206,7 +207,7 @@ class CellFeatures(NamedTuple):
     nearnesses: Float32s
 
     def rows(self, cells: Cells) -> Float32s:
-        """(n, `SCAN_INPUTS`) of some cells (n,)."""
+        """Return (n, `SCAN_INPUTS`) of some cells (n,)."""
         marks = np.unpackbits(self.codes[cells, None], axis=1, bitorder="little")
         return np.column_stack([marks, self.sizes[cells], self.nearnesses[cells]]).astype(
             np.float32
@@ -218,7 +219,7 @@ class CellInputs:
 
     def __init__(self, rig: Rig):
         self.rig = rig
-        # The same task without margins: its wedges are those of the boxes themselves.
+        # The same task without margins, whose wedges are those of the boxes themselves.
         self._undilated = replace(rig, azimuth_margin=0, elevation_margin=0)
         self._heights = rig.grid.directions[:, 2].astype(np.float32)
 
@@ -246,11 +247,11 @@ class CellInputs:
 
     @cached_property
     def rig_inputs(self) -> Float32s:
-        """(N, `RIG_INPUTS`) what is known of every cell without a keyframe."""
+        """Return (N, `RIG_INPUTS`) the inputs of every cell that need no keyframe."""
         grid = self.rig.grid
         x, y, z = grid.directions.T
         flat = np.hypot(x, y)
-        # Where a ray meets a level road; one that does not fall never does.
+        # Range at which a ray meets a level road, if it falls.
         height = self.rig.sensor_height_m + grid.origins_of(np.arange(grid.size))[..., 2]
         road = np.divide(height, -z, out=np.full(len(z), np.inf), where=z < 0)
         ground = 1 - np.minimum(road / grid.range_m, 1)
@@ -261,8 +262,8 @@ class CellInputs:
     def _sets(
         self, belief: Belief, hulls: Sequence[Cells]
     ) -> tuple[Cells, Cells, NDArray[np.uint8]]:
-        """Cells of hulls, wedges and undilated wedges, one set after the other, where each set
-        ends, and its marks. The order of the three is that of the marks below.
+        """Return the concatenated cells of hulls, wedges and undilated wedges, the end of each set,
+        and its marks. The order of the three is that of the marks below.
         """
         detections = belief.detections
         known = explained(detections, belief.tracks, self.rig)
@@ -279,8 +280,8 @@ class CellInputs:
         return sets.cells, np.cumsum(sets.sizes), marks.astype(np.uint8)
 
     def _covered(self) -> Mask:
-        """(N,) whether a point at the end of a cell's ray lies in a picture. So far out the offset
-        of a camera from the LiDAR no longer matters.
+        """Return (N,) whether the end of a cell's ray lies in a picture. At that range the offset
+        of a camera from the LiDAR does not matter.
         """
         grid = self.rig.grid
         covered = np.zeros(grid.size, bool)

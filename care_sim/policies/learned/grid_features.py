@@ -27,14 +27,12 @@ BlockPictures = NDArray[np.float32]
 
 
 class AboveRoad(NamedTuple):
-    """Geometry that says how far above the road a ray ends, and between which heights a return
-    stands.
-    """
+    """Heights of rays above the road, and the heights between which a return counts as standing."""
 
     rises: NDArray[np.float64]
-    """(N,) how far each ray rises per metre of range."""
+    """(N,) rise of each ray per metre of range."""
     heights_m: NDArray[np.float64]
-    """(N,) where each ray begins above the road."""
+    """(N,) height of each ray's origin above the road."""
     reach_m: float
     lowest_m: float
     highest_m: float
@@ -55,9 +53,9 @@ def draw_pictures(
     their last `scans` (W, N) in metres. Only marked or fired cells are touched, since most cells of
     a keyframe are neither.
 
-    The objects are sets of so many `sizes`, one after the other in `cells`, in three groups: those
-    of the first group, of which `counts[0, w]` are of world w, world after world, then the other
-    two. `blocks` (N,) is the block of every cell, `marks` (N,) memory to work in.
+    The objects are sets of `sizes` cells, concatenated in `cells`, in three groups. Within each
+    group they are ordered by world, with `counts[g, w]` sets of group g in world w. `blocks` (N,)
+    is the block of every cell, `marks` (N,) working memory.
     """
     ends = np.cumsum(sizes)
     firsts = counts.sum(axis=1)
@@ -77,10 +75,10 @@ def draw_pictures(
 def _add_object(
     cells: Cells, group: int, blocks: Cells, marks: NDArray[np.uint8], out: BlockPictures
 ) -> None:
-    """Add to `out[group]` the share of each block's cells that are among `cells` and are not in the
-    group yet: bit g of a cell's mark says whether it is in group g.
+    """Add to `out[group]` the share of each block's cells that are among `cells` and not in the
+    group yet. Bit g of a cell's mark is set if it is in group g.
     """
-    # What one cell adds to the share of its block: blocks per cell.
+    # Contribution of one cell to the share of its block.
     part = np.float32(out.shape[1] / len(blocks))
     for cell in cells:
         # Sets of a group overlap; a cell counts once per group.
@@ -97,9 +95,9 @@ def _add_returns(
     marks: NDArray[np.uint8],
     out: BlockPictures,
 ) -> None:
-    """Fill `out` from a scan (N,): the nearness of each block's nearest return, the share of its
-    cells that fired, and the share of those with a return that stands above the road outside every
-    hull. The hulls are the first group of `marks`.
+    """Fill `out` from a scan (N,), per block. The nearness of its nearest return, the share of its
+    fired cells, and the share of cells with a return above the road and outside every hull. The
+    hulls are the first group of `marks`.
     """
     part = np.float32(out.shape[1] / len(blocks))
     for cell in range(len(ranges)):
@@ -121,10 +119,10 @@ CHANNELS = ("forecast", "residual", "explained", "nearness", "fired", "undetecte
 """The pictures, in order; see `care_sim.envs.wrappers.grid_observation.GridObservation`."""
 EGO_INPUTS = ("speed", "yaw_rate", "acceleration", "budget")
 EGO_SCALES = np.array([30.0, 1.0, 10.0, 1.0], np.float32)
-"""m/s, rad/s, m/s^2 and the share of the cells that are shown as 1."""
+"""Values shown as 1: m/s, rad/s, m/s^2 and the share of the cells."""
 STANDING_M = (KERB_CLEARANCE_M, 4.0)
-"""Heights above the road between which a return stands for something: over kerbs, under the bodies
-of bridges and the crowns of trees. The tallest of the five classes are lower.
+"""Heights above the road between which a return counts as standing: over kerbs, under bridges and
+the crowns of trees. The tallest of the five classes are lower.
 """
 
 
@@ -133,8 +131,8 @@ class GridFeatures:
     """Beliefs of a rig as pictures and a vector.
 
     The pictures are `CHANNELS` over `columns` x `rows` blocks of the grid, the vector `EGO_INPUTS`.
-    A block of `nearness` takes the largest value of its cells, one of the other channels a share of
-    them. Raises InvalidInput unless the blocks divide the grid. Not for several threads at once,
+    A block of `nearness` takes the largest value of its cells; in other channels it takes a share
+    of cells. Raises InvalidInput unless the blocks divide the grid. Use it in one thread at a time,
     since it reuses its memory.
     """
 
@@ -158,25 +156,25 @@ class GridFeatures:
         return len(CHANNELS), self.rows, self.columns
 
     def __call__(self, belief: Belief) -> Observation:
-        """`grid` (channels * rows * columns,) and `ego` (4,), both float32."""
+        """Return `grid` (channels * rows * columns,) and `ego` (4,), both float32."""
         return {name: rows[0] for name, rows in self.of_all(Beliefs.of(belief, self.rig)).items()}
 
     def of_all(self, beliefs: Beliefs) -> dict[str, NDArray[np.float32]]:
-        """The same of W worlds: `grid` (W, channels * rows * columns) and `ego` (W, 4)."""
+        """Return the same of W worlds: `grid` (W, channels * rows * columns) and `ego` (W, 4)."""
         out = np.zeros((len(beliefs), len(CHANNELS), self.rows * self.columns), np.float32)
-        # In the order of the first three channels; where the first, the hulls, lie is asked again
-        # when the returns are drawn.
+        # In the order of the first three channels. The first, the hulls, is used again when the
+        # returns are drawn.
         groups = [beliefs.hulls, *camera_layers_of(beliefs)]
         sets = CellSets.joined([group.sets for group in groups])
         counts = np.array([group.counts for group in groups])
         told = sets.cells, sets.sizes, counts, beliefs.ranges
         draw_pictures(*told, self._above, self._blocks, self._marks, out)
-        # Shares are sums of float32 parts, and a full block may end a little above 1.
+        # Shares are sums of float32 parts, so a full block may be slightly above 1.
         grid = np.minimum(out, 1, out=out).reshape(len(beliefs), -1)
         return {"grid": grid, "ego": self._egos(beliefs)}
 
     def _egos(self, beliefs: Beliefs) -> NDArray[np.float32]:
-        """(W, 4) the `EGO_INPUTS`, scaled and clipped to -1 to 1."""
+        """Return (W, 4) the `EGO_INPUTS`, scaled and clipped to -1 to 1."""
         shares = beliefs.budgets[:, None] / self.rig.grid.size
         values = np.concatenate([beliefs.egos, shares], axis=1).astype(np.float32)
         return np.asarray(np.clip(values / EGO_SCALES, -1, 1))
@@ -199,12 +197,12 @@ class GridFeatures:
 
     @cached_property
     def _blocks(self) -> Cells:
-        """(N,) the block of every cell."""
+        """Return (N,) the block of every cell."""
         blocks = np.empty(self.rig.grid.size, np.int64)
         blocks[self.blocks.cells] = np.arange(self.rows * self.columns)[:, None]
         return blocks
 
     @cached_property
     def _marks(self) -> NDArray[np.uint8]:
-        """(N,) memory of the kernels: which of the first three channels a cell lies in."""
+        """Return (N,) working memory of the kernels: marks of the first three channels."""
         return np.empty(self.rig.grid.size, np.uint8)

@@ -27,13 +27,13 @@ from care_sim.policies.learned.weights import Weights, load_weights, shipped_wei
 class LearnedScorer(Policy):
     """The learned scorer of the paper (Sec. 5.1): history with a learned reserve.
 
-    A small network scores every cell by what a policy can see of it
-    (`care_sim.policies.learned.cell_inputs`), and the reserve asks for the rho B highest. What
-    exploitation has of them already goes to the floor, as with `history-uniform`.
+    A small network scores every cell (`care_sim.policies.learned.cell_inputs`), and the reserve
+    demands the rho B highest. Budget for cells that exploitation already took goes to the floor, as
+    with `history-uniform`.
 
-    `path` is a file of weights that `care-sim train learned-scorer` wrote; without it the shipped
-    ones act. They serve any budget and any cameras. Raises InvalidInput for a file of something
-    else or one made for another grid.
+    `path` is a file of weights that `care-sim train learned-scorer` wrote, by default the shipped
+    one. Weights serve any budget and any cameras. Raises InvalidInput for another kind of file or
+    another grid.
     """
 
     name = "learned-scorer"
@@ -50,7 +50,7 @@ class LearnedScorer(Policy):
         self._reserve = rig.budget - half_up((1 - rig.reserve_fraction) * rig.budget)
 
     def demand(self, belief: Belief) -> Demand:
-        """Hulls, then the cells of the highest scores."""
+        """Return the hulls, then the cells of the highest scores."""
         hulls = self.rig.hulls(belief.tracks.boxes)
         return Demand(
             hulls, [[highest(self._network.scores(self._inputs.of(belief, hulls)), self._reserve)]]
@@ -58,11 +58,11 @@ class LearnedScorer(Policy):
 
 
 class CellNetwork:
-    """The network of some weights over cells whose rig_inputs (N, `RIG_INPUTS`) are fixed."""
+    """The network over cells with fixed inputs of the rig (N, `RIG_INPUTS`)."""
 
     def __init__(self, weights: Weights, rig_inputs: NDArray[np.float32]):
-        # The first layer is linear, so its sum falls into parts. What the rig decides and what each
-        # code of marks adds is computed here once; a keyframe looks it up and adds two products.
+        # The first layer is linear, so its sum splits into parts. The parts of the rig and of each
+        # code of marks are computed once. A keyframe looks them up and adds two products.
         layer = weights.array("layer", SCAN_INPUTS + len(RIG_INPUTS), None)
         units = layer.shape[1]
         self._out = weights.array("out", units)
@@ -72,21 +72,25 @@ class CellNetwork:
         self._mark_weights = MarkWeights(_by_code(layer[: len(CELL_MARKS)]), by_size, by_nearness)
 
     def scores(self, seen: CellFeatures) -> NDArray[np.float32]:
-        """(N,) of cells; higher where an object without a track is likelier."""
+        """Return (N,) scores of cells, higher where an untracked object is likelier."""
         return network_scores(*seen, self._rig_terms, self._mark_weights, self._out)
 
 
 def _by_code(layer: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(256, h) what every code of marks adds to the units, given what each mark does (8, h)."""
+    """Return (256, h) the contribution of every code of marks to the units, from the weights of
+    marks (8, h).
+    """
     codes = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1, bitorder="little")
     return codes.astype(np.float32) @ layer
 
 
 def highest(scores: NDArray[np.float32], count: int) -> Cells:
-    """The `count` cells of the highest scores, ascending; of equals those of the lowest index."""
+    """Return the `count` cells of the highest scores, ascending. Of equal scores the lowest index
+    is taken.
+    """
     if not 0 < count < len(scores):
         return np.arange(len(scores))[:count]
-    # A partition and not a sort: the order among the highest does not matter, only who they are.
+    # A partition, not a sort: the order among the highest does not matter.
     least = np.partition(scores, -count)[-count]
     above = np.flatnonzero(scores > least)
     equal = np.flatnonzero(scores == least)[: count - len(above)]

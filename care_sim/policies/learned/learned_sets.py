@@ -18,18 +18,19 @@ from care_sim.policies.learned.set_kernels import Numbers, best_cells
 from care_sim.policies.learned.weights import Weights, load_weights, shipped_weights
 
 STEPS = (3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48)
-"""Cells of an item, in its order, after which it is asked whether three have returned."""
+"""Numbers of an item's first cells at which the network predicts whether three have returned."""
 LEARNED_RETURNS = 3
-"""What a detection needed where it was learned. One that needs n times as many is taken to need n
-times the cells."""
+"""Returns per detection in the training. A detector that needs n times as many is assumed to need n
+times the cells.
+"""
 
 
 class SetNetwork:
     """The network of some weights. Raises InvalidInput for weights of another form.
 
-    Items pass a layer of rectified units; one head of scaled dot products tells each of all
-    others; a second layer of units reads both (Vaswani et al., Attention is all you need, 2017).
-    Strips have a map of their places and one layer of units.
+    Items pass a layer of rectified units. One attention head combines all items (Vaswani et al.,
+    Attention is all you need, 2017), and a second layer reads both. Strips have a map of their
+    places and one layer of units.
     """
 
     def __init__(self, weights: Weights, places: int):
@@ -53,14 +54,16 @@ class SetNetwork:
             "strip_bias": (strip_units,),
             "strip_out": (strip_units,),
         }
-        # In float64, and rounded at the end: what a processor or a library sums in another order
-        # differs in last bits, by which two cells of nearly one gain would change places.
+        # In float64, rounded at the end. Processors and libraries sum in different orders, and
+        # differences in the last bits would swap cells of nearly equal gain.
         self._of = {
             name: weights.array(name, *shape).astype(np.float64) for name, shape in shapes.items()
         }
 
     def chances(self, items: Items) -> Numbers:
-        """(n, `STEPS`) that an object of each item has returned three times after so many cells."""
+        """Return (n, `STEPS`) the chance that each item's object has returned three times after
+        these numbers of cells.
+        """
         of = self._of
         if not len(items.inputs):
             return np.zeros((0, len(STEPS)), np.float32)
@@ -70,11 +73,11 @@ class SetNetwork:
         both = np.hstack([units, told])
         units = np.maximum(both @ of["second"] + of["second_bias"], 0)
         shares = _softmax(units @ of["out"] + of["out_bias"])
-        # The last share is that of items without such an object.
+        # The last share belongs to items without such an object.
         return np.cumsum(shares[:, :-1], axis=1).astype(np.float32)
 
     def strip_chances(self, items: Items, places: np.ndarray) -> Numbers:
-        """(S,) that a strip finds an object of which no box and no track tells."""
+        """Return (S,) the chance that a strip detects an object without a box and a track."""
         of = self._of
         units = np.maximum(items.strips @ of["strip"] + of["strip_bias"], 0)
         logits = units @ of["strip_out"] + of["map"][places]
@@ -89,28 +92,28 @@ def _softmax(scores: Floats) -> Floats:
 
 
 REFRESH_PER_S = 0.3
-"""What it is worth to detect again an object that was last detected a second ago, beside 1 for an
-object that has no track; it is worth 1 at most. Chosen on the streets 2000 to 2003 and the drives
-2000 to 2023, none of which is scored."""
+"""Worth of detecting again an object that was last detected a second ago; an untracked object is
+worth 1, the maximum. Chosen on the streets 2000 to 2003 and the drives 2000 to 2023, none of which
+is scored.
+"""
 
 
 class LearnedSets(Policy):
     """Camera boxes and tracks as a set, each with a learned chance; cells go where they gain most.
 
-    Every camera box and every track is an item of a set, and so are strips of cells for whatever
-    neither tells of. A small network with attention over the items says of each the chance that
-    its first 3, 4, 5, ... cells detect an object. The cells of the budget go, piece by piece, where
-    a cell gains most.
+    Camera boxes, tracks and strips of other cells are the items of a set. A small network with
+    attention over the items predicts for each the chance that its first 3, 4, 5, ... cells detect
+    an object. The budget's cells go, piece by piece, where a cell gains most.
 
-    An object without a track is worth 1, one with a track `refresh_per_s` for every second since
-    it was last detected. So which items are served, and with how many cells, is learned; nothing
-    is spent on what is found already or cannot be found. The cells of an item are listed with the
-    undilated core first (`core-spread`), unless the rig has an order. There are no exploitation
-    sets: the share rho plays no part.
+    An object without a track is worth 1. An object with a track is worth `refresh_per_s` for every
+    second since its last detection. So the network learns which items to serve, and with how many
+    cells. Detected or undetectable objects get no cells. An item's cells begin with the undilated
+    core (`core-spread`), unless the rig has an order. There are no exploitation sets: the share rho
+    plays no part.
 
-    `path` is a file of weights that `care-sim train learned-sets` wrote; without it the shipped
-    ones act. They serve any budget and any cameras. Raises InvalidInput for a file of something
-    else or one made for another grid.
+    `path` is a file of weights that `care-sim train learned-sets` wrote, by default the shipped
+    one. Weights serve any budget and any cameras. Raises InvalidInput for another kind of file or
+    another grid.
     """
 
     name = "learned-sets"
@@ -138,7 +141,7 @@ class LearnedSets(Policy):
         self._refresh_per_s = refresh_per_s
 
     def demand(self, belief: Belief) -> Demand:
-        """One layer of one set: the cells in the order of what they gain."""
+        """Return one layer of one set: the cells by descending gain."""
         items = self._items.of(belief)
         unseen_s = (belief.tracks.misses + 1) * self.rig.keyframe_s
         worth = np.ones(len(items.sets), np.float32)

@@ -1,11 +1,10 @@
 """A learned allocator: a small network, trained by proximal policy optimisation, scores sectors.
 
-What it reads is in `care_sim.policies.learned.grid_features`, the file of weights in `weights`, and
-the training in `care_sim.training`. The network is small and slides over the sectors.
+Its inputs are in `care_sim.policies.learned.grid_features`, its file of weights in `weights`, and
+its training in `care_sim.training`. The network is small and slides over the sectors.
 
-It sees the coarse blocks of a sector and one block more on each side, over the seam of a grid that
-goes all round, too, and the car's own motion. Hidden layers are rectified, scores are hyperbolic
-tangents of
+It reads the coarse blocks of a sector, one more block on each side (also across the seam of a full
+turn), and the car's own motion. Hidden layers are rectified, scores are hyperbolic tangents of
 
     score.weight . relu(hidden.weight relu(window.weight * blocks + ego.weight ego + window.bias) +
     hidden.bias) + place
@@ -31,12 +30,12 @@ from care_sim.policies.learned.sectors import SectorChoice, Tiling
 from care_sim.policies.learned.weights import Weights, load_weights, shipped_weights
 
 BLOCK_MARGIN = 1
-"""Blocks seen beyond a sector on every side."""
+"""Blocks beyond a sector on every side that the network reads."""
 
 
 class ScoreMap:
-    """Scores of sectors from the observation of `GridObservation`; `goes_round` says whether the
-    grid does. Raises InvalidInput for arrays that do not fit.
+    """Scores of sectors from the observation of `GridObservation`. `goes_round` is True for a full
+    turn. Raises InvalidInput for arrays that do not fit.
     """
 
     def __init__(self, weights: Weights, wrapping: Wrapping, goes_round: bool = True):
@@ -58,16 +57,16 @@ class ScoreMap:
         self._place = weights.array("place", wrapping.elevations, wrapping.azimuths)
 
     def __call__(self, observation: Observation) -> NDArray[np.float32]:
-        """(elevations, azimuths) from -1 to 1."""
+        """Return (elevations, azimuths) scores from -1 to 1."""
         scores: NDArray[np.float32] = self.of_all(
             {name: values[None] for name, values in observation.items()}
         )[0]
         return scores
 
     def of_all(self, observation: Observation) -> NDArray[np.float32]:
-        """(W, elevations, azimuths) of the observations of W worlds, stacked."""
-        # Products of stacks of matrices, which NumPy makes one by one: of every world the very
-        # numbers that it has alone. One product of all would round otherwise.
+        """Return (W, elevations, azimuths) scores of the stacked observations of W worlds."""
+        # NumPy multiplies stacks of matrices one by one, so every world has the same numbers as
+        # alone. One product of all worlds would round differently.
         ego = (self._ego @ observation["ego"][..., None]).swapaxes(1, 2)
         seen = self._windows(observation["grid"]) @ self._kernel + (ego + self._bias)
         weight, bias = self._hidden
@@ -76,18 +75,18 @@ class ScoreMap:
         return np.asarray(np.tanh(scores + self._place))
 
     def _windows(self, grids: NDArray[np.float32]) -> NDArray[np.float32]:
-        """(W, sectors, channels * blocks) what each sector sees; nothing beyond the grid."""
+        """Return (W, sectors, channels * blocks) the inputs of each sector, 0 beyond the grid."""
         channels, rows, columns = self._shape
         margin = BLOCK_MARGIN
         padded = np.zeros(
             (len(grids), channels, rows + 2 * margin, columns + 2 * margin), np.float32
         )
         padded[..., margin:-margin, margin:-margin] = grids.reshape(-1, *self._shape)
-        # Where columns go round the car, each end continues with the other one's blocks.
+        # On a full turn, each end continues with the blocks of the other.
         if self._goes_round:
             padded[..., :margin] = padded[..., -2 * margin : -margin]
             padded[..., -margin:] = padded[..., margin : 2 * margin]
-        # Windows of neighbouring sectors overlap by the margins.
+        # Windows of neighbouring sectors overlap by their margins.
         tall, wide = self._stride
         windows = np.lib.stride_tricks.sliding_window_view(padded, self._window, axis=(2, 3))[
             ..., ::tall, ::wide, :, :
@@ -101,9 +100,9 @@ class PpoPolicy(RowPolicy):
 
     The policy acts as the learner does behind its wrappers, without exploration.
 
-    `path` is a file of weights that `care-sim train ppo` wrote. Without it those act that come with
-    the package, learned on the dense street at all budgets of its tables. Raises InvalidInput for
-    weights that are missing, damaged, of another kind, or made for another grid or budget.
+    `path` is a file of weights that `care-sim train ppo` wrote. The shipped default was learned on
+    the dense street at all budgets of its tables. Raises InvalidInput for weights that are missing,
+    damaged, of another kind, or made for another grid or budget.
     """
 
     name = "ppo"
@@ -118,7 +117,7 @@ class PpoPolicy(RowPolicy):
     def __init__(self, rig: Rig, path: str | PathLike[str] | None = None):
         super().__init__(rig)
         file = load_weights(shipped_weights(self.weights) if path is None else path)
-        # Not `self.name`: weights of both streets are of the kind 'ppo'.
+        # Not `self.name`: weights of both scenarios are of the kind 'ppo'.
         file.check(PpoPolicy.name, rig)
         wrapping = file.card.wrapper
         if wrapping is None:
@@ -130,8 +129,8 @@ class PpoPolicy(RowPolicy):
         self._score_map = ScoreMap(file, wrapping, rig.grid.goes_round)
 
     def stages(self, beliefs: Beliefs) -> list[WorldSets]:
-        """Hulls and the sectors scored above 0, best first; or, learned with `SectorScores`, the
-        sectors alone.
+        """Return hulls and the sectors scored above 0, best first; or, if learned with
+        `SectorScores`, only the sectors.
         """
         scores = self._score_map.of_all(self._features.of_all(beliefs))
         if self._reserve_alone:
@@ -140,7 +139,7 @@ class PpoPolicy(RowPolicy):
 
 
 class PpoDartoutPolicy(PpoPolicy):
-    """The same, learned on the dart-out."""
+    """The policy `ppo`, learned on the dart-out."""
 
     name = "ppo-dartout"
     source = (

@@ -1,6 +1,6 @@
-"""Equal tiles of the angular grid: the sectors that an agent scores and the coarse blocks in which
-it sees. And what scores of sectors ask of the shared allocator, and what it then fires, in any
-number of worlds.
+"""Equal tiles of the angular grid: sectors that an agent scores, and coarse blocks of its inputs.
+Also the demand of sector scores on the shared allocator, and the resulting actions, in any number
+of worlds.
 """
 
 from dataclasses import dataclass
@@ -47,7 +47,7 @@ class Tiling:
             check_whole(name, count, 1, cells)
             if cells % count:
                 raise InvalidInput(f"{name} must divide the {cells} of the grid, got {count}")
-        # A tile of two LiDARs would be no place.
+        # A tile must not mix two LiDARs.
         tall, _ = self.tile_shape
         if any(head.grid.rows % tall for head in self.grid.heads):
             rows = ", ".join(str(head.grid.rows) for head in self.grid.heads)
@@ -70,15 +70,15 @@ class Tiling:
     def cells(self) -> Cells:
         """(tiles, n) the cells of every tile, ascending."""
         rows, columns = self.tile_shape
-        # Axes: tile row, row in the tile, tile column, column in the tile. The middle two change
-        # places, so that the cells of a tile come together.
+        # Axes: tile row, row in the tile, tile column, column in the tile. Swapping the middle two
+        # puts the cells of a tile together.
         pictured = np.arange(self.grid.size).reshape(self.elevations, rows, self.azimuths, columns)
         return pictured.swapaxes(1, 2).reshape(self.elevations * self.azimuths, rows * columns)
 
     def ranked(self, scores: NDArray[np.floating], enough: int) -> tuple[Integers, Integers]:
-        """Return the best tiles (W, m) of W pictures of `scores` (W, ...), ties by ascending index,
-        and how many (W,) of these have a strictly positive score; no more tiles than hold `enough`
-        cells.
+        """Return the best tiles (W, m) of W pictures of `scores` (W, ...), ties by ascending index.
+        Also returns how many (W,) of them have a positive score. The tiles hold at most `enough`
+        cells, rounded up to a tile.
         """
         flat = scores.reshape(len(scores), -1)
         most = min(-(-enough // self.cells.shape[1]), len(self.cells))
@@ -90,26 +90,26 @@ class Tiling:
 def reserve_demand(
     belief: Belief, rig: Rig, sectors: Tiling, scores: NDArray[np.floating]
 ) -> Demand:
-    """The forecasts' hulls, then the sectors with a positive score as layers of the reserve, best
-    first: what `care_sim.policies.learned.sectors.SectorChoice` asks for, in one world and
-    not yet in the rig's `cell_order`, for a policy of your own.
+    """Return the forecasts' hulls, then the sectors with a positive score as reserve layers, best
+    first, for your own policy. The demand is that of
+    `care_sim.policies.learned.sectors.SectorChoice` in one world, before the rig's `cell_order`.
     """
-    enough = enough_beside_hulls(rig.budget)
+    enough = count_beside_hulls(rig.budget)
     (ranked,), (count,) = sectors.ranked(np.reshape(scores, (1, -1)), enough)
     return Demand(
         rig.hulls(belief.tracks.boxes), [[cells] for cells in sectors.cells[ranked[:count]]]
     )
 
 
-def enough_beside_hulls(budget: _Cells) -> _Cells:
-    """Cells of sectors that fill a budget, or each of some, whatever the hulls take."""
-    # At most one budget of the cells of sectors is taken by hulls.
+def count_beside_hulls(budget: _Cells) -> _Cells:
+    """Return the number of sector cells that fill a budget, or several, whatever the hulls take."""
+    # Hulls take at most one budget of the sectors' cells.
     return 2 * budget
 
 
 class SectorChoice:
-    """The stages of Algorithm 1 for scores (W, ...) of the `sectors` of W worlds. All sets are
-    listed in the rig's `cell_order` already.
+    """Stages of Algorithm 1 for scores (W, ...) of the `sectors` of W worlds. All sets are already
+    in the rig's `cell_order`.
     """
 
     def __init__(self, rig: Rig, sectors: Tiling):
@@ -117,21 +117,20 @@ class SectorChoice:
         self._sectors = sectors
 
     def reserve(self, beliefs: Beliefs, scores: NDArray[np.floating]) -> list[WorldSets]:
-        """The forecasts' hulls, then the sectors with a positive score in the reserve, best first;
-        each world has the budget that it is told.
+        """Return the forecasts' hulls, then the sectors with a positive score in the reserve, best
+        first. Each world has its own budget.
         """
         hulls = beliefs.hulls
         listed = WorldSets(self._rig.listed(hulls.sets), hulls.counts)
-        return [listed, self._best(scores, enough_beside_hulls(beliefs.budgets))]
+        return [listed, self._best(scores, count_beside_hulls(beliefs.budgets))]
 
     def alone(self, scores: NDArray[np.floating], budgets: Integers) -> list[WorldSets]:
-        """The sectors with a positive score alone, best first, for `budgets` (W,)."""
+        """Return only the sectors with a positive score, best first, for `budgets` (W,)."""
         return [WorldSets.nothing(len(scores)), self._best(scores, budgets)]
 
     def _best(self, scores: NDArray[np.floating], enough: Integers) -> WorldSets:
-        """Return one set per world, the cells of the sectors with a positive score, best first, up
-        to the one that makes them `enough` (W,). One set gives in turn what a layer per sector
-        would.
+        """Return one set per world: the cells of the sectors with a positive score, best first, up
+        to `enough` (W,) cells. One set in this order equals a layer per sector.
         """
         tile = self._sectors.cells.shape[1]
         ranked, counts = self._sectors.ranked(scores, int(enough.max()))
@@ -141,14 +140,14 @@ class SectorChoice:
 
     @cached_property
     def _listed(self) -> Cells:
-        """(sectors, n) the cells of every sector in the order in which they are taken."""
+        """Return (sectors, n) the cells of every sector in the order of firing."""
         cells = self._sectors.cells
         return self._rig.listed(list(cells)).cells.reshape(cells.shape)
 
 
 class SectorActions:
-    """The actions (W, E, A) for scores (W, ...) of the `sectors` of W worlds, each with its own of
-    the `budgets` (W,). They are read-only, and the next call overwrites them.
+    """Actions (W, E, A) for scores (W, ...) of the `sectors` of W worlds with `budgets` (W,). They
+    are read-only, and the next call overwrites them.
     """
 
     def __init__(self, rig: Rig, sectors: Tiling, budgets: Integers):

@@ -23,7 +23,7 @@ from care_sim.policies.own.care import CORE_FIRST
 from care_sim.policies.paper.tracks import GROUND_CLEARANCE_M
 
 LOOKED_AT = 24
-"""So many cells of an item tell what the last scan found there."""
+"""Number of an item's cells whose last returns are its inputs."""
 STRIP_COLUMNS = 8
 STRIP_ROWS_DEG = (-14.0, 3.0)
 """Strips lie between these elevations: 14 degrees down the road is 7 m away."""
@@ -34,16 +34,15 @@ _OF_TRACK = ("shown", "hits", "unseen", "velocity ahead", "velocity to the left"
 _OF_SCAN = ("covered", "fired", "returned", "nearness of returns", "standing")
 _OF_CAR = ("speed of the car", "yaw rate", "keyframe", "boxes", "tracks")
 ITEM_INPUTS = (*_OF_KIND, *_OF_PLACE, *_OF_BOX, *_OF_TRACK, *_OF_SCAN, *_OF_CAR)
-"""What is told of a box or a track, all of it of the order of 1; what belongs to the other kind is
-0."""
+"""Inputs of a box or a track, all of the order of 1; inputs of the other kind are 0."""
 MIRRORED = np.isin(ITEM_INPUTS, ("sin azimuth", "velocity to the left", "yaw rate"))
-"""(inputs,) those that change their sign where left and right are exchanged."""
+"""(inputs,) marks inputs that change their sign when left and right are exchanged."""
 STRIP_INPUTS = (
     "in hulls", "in boxes", *_OF_SCAN[1:],
     "cos azimuth", "height of a ray", "in a picture",
     "speed of the car", "keyframe", "boxes", "tracks",
 )  # fmt: skip
-"""What is told of a strip, besides which place it is."""
+"""Inputs of a strip, besides its place."""
 
 _PLACE = len(_OF_KIND)
 _LOG_SIZE = ITEM_INPUTS.index("log size")
@@ -51,17 +50,16 @@ _BOX = _PLACE + len(_OF_PLACE)
 _TRACK = _BOX + len(_OF_BOX)
 _SCAN = _TRACK + len(_OF_TRACK)
 _CAR = _SCAN + len(_OF_SCAN)
-"""Columns of `ITEM_INPUTS` at which its parts begin."""
+"""Columns of `ITEM_INPUTS` at which each part begins."""
 _HEIGHTS_M = np.array([1.5, 3.0, 3.0, 1.7, 1.7])
-"""About as high are things of each class; so a box tells a range."""
+"""Approximate height of each class, which turns a box into a range."""
 _LONGEST_S = 2.0
-"""Times beyond it are told as this."""
+"""Longer times are clipped to this."""
 
 
 class Items(NamedTuple):
     """The items of a keyframe: `boxes` camera boxes, then all tracks, the nearest first. Their
-    cells are `sets`, the core first; `inputs` (n, `ITEM_INPUTS`) tell of them, and `strips`
-    (S, `STRIP_INPUTS`) of the strips.
+    cells are `sets`, the core first. `inputs` are (n, `ITEM_INPUTS`), `strips` (S, `STRIP_INPUTS`).
     """
 
     sets: CellSets
@@ -71,11 +69,11 @@ class Items(NamedTuple):
 
 
 class ItemReader:
-    """Makes the items of beliefs of a `rig` with one level LiDAR all round. Of every item at most
-    the first `most` cells are listed.
+    """Makes items from beliefs of a `rig` with one level LiDAR of a full turn. Each item lists at
+    most its first `most` cells.
 
-    `strips` (S, `STRIP_COLUMNS`) are the cells of the strips, row by row from the top, and `places`
-    (S,) number them so that mirrored ones are one place.
+    `strips` (S, `STRIP_COLUMNS`) are the cells of the strips, row by row from the top. `places`
+    (S,) number the strips; mirrored strips share a place.
     """
 
     def __init__(self, rig: Rig, most: int):
@@ -93,13 +91,13 @@ class ItemReader:
         x, _, z = grid.directions[self.strips].mean(axis=1).T
         covered = CellInputs(rig).rig_inputs[self.strips, RIG_INPUTS.index("in a picture")]
         self._of_places = np.stack([x / np.sqrt(1 - z**2), z / 0.25, covered.mean(axis=1)], 1)
-        # A return before it stands above a level road.
+        # A nearer return is above a level road.
         falls = -grid.directions[:, 2]
         clear_m = max(rig.sensor_height_m - GROUND_CLEARANCE_M, 0.0)
         self._road = np.where(falls > 0, clear_m / np.maximum(falls, 1e-9), np.inf)
 
     def of(self, belief: Belief) -> Items:
-        """The items of a keyframe."""
+        """Return the items of a keyframe."""
         rig = self.rig
         detections, tracks = belief.detections, belief.tracks
         seen, hulls = wedges(detections, rig), rig.hulls(tracks.boxes)
@@ -135,7 +133,7 @@ class ItemReader:
             return
         x, y, z = np.moveaxis(wedge_rays(detections, self.rig), -1, 0)
         azimuths, elevations = np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))
-        # From the middle on, so that the seam behind the car is no gap.
+        # Relative to the middle, so that the seam behind the car is no gap.
         off = (azimuths - azimuths[:, :1] + np.pi) % (2 * np.pi) - np.pi
         width = off.max(axis=1) - off.min(axis=1)
         height = elevations.max(axis=1) - elevations.min(axis=1)

@@ -1,4 +1,4 @@
-"""Sets of cells looked through, and cells chosen from them by what they gain, compiled."""
+"""Statistics of sets of cells, and the choice of cells by gain, compiled."""
 
 from typing import NamedTuple
 
@@ -23,8 +23,8 @@ def covered_shares(
     wedge_sizes: Integers,
     marks: NDArray[np.uint8],
 ) -> Numbers:
-    """(w + h,) the share of the cells of every wedge that lie in a hull, then that of every hull
-    in those before it, which are nearer. `marks` (N,), zeros before, are filled.
+    """Return (w + h,) the share of every wedge's cells that lie in a hull, then of every hull's in
+    nearer hulls before it. `marks` (N,), zeros before, are filled.
     """
     shares = np.zeros(len(wedge_sizes) + len(hull_sizes), np.float32)
     start = 0
@@ -55,10 +55,10 @@ def _marked(cells: Cells, marks: NDArray[np.uint8]) -> int:
 def look_back(
     cells: Cells, sizes: Integers, ranges: Numbers, road: Floats, reach: float, first: int
 ) -> Numbers:
-    """(n, 4) what the last scan, `ranges` (N,), told of the first so many cells of every set: the
-    share that fired; of these the share with a return; of these the mean nearness, 1 at the sensor
-    and 0 at the `reach`, and the share that stands above the road, which is met at `road` (N,)
-    metres.
+    """Return (n, 4) statistics of the last scan `ranges` (N,) over the first cells of every set.
+    First the fired share, then the share of these with a return. Then the mean nearness of returns,
+    1 at the sensor and 0 at the `reach`, and the share of returns above the road. Rays meet the
+    road at `road` (N,) metres.
     """
     told = np.zeros((len(sizes), 4), np.float32)
     start = 0
@@ -89,8 +89,8 @@ def look_at_strips(
     marks: NDArray[np.uint8],
     told: Numbers,
 ) -> None:
-    """Fill the first columns of `told` (S, 6 or more): the shares of the cells of every strip that
-    lie in hulls and in wedges, by their `marks` (N,), then what `look_back` tells.
+    """Fill the first columns of `told` (S, 6 or more) per strip. First the shares of its cells in
+    hulls and in wedges, by their `marks` (N,), then the result of `look_back`.
     """
     count, size = strips.shape
     told[:, 2:6] = look_back(strips.ravel(), np.full(count, size), ranges, road, reach, size)
@@ -103,8 +103,8 @@ def look_at_strips(
 
 
 class _Pieces(NamedTuple):
-    """Pieces of sets (p,): what a cell of each gains, and where in all cells each begins and ends.
-    Those of strips come after all cells.
+    """Pieces of sets (p,): the gain per cell, and the begin and end of each in all cells. Pieces of
+    strips come after all cells.
     """
 
     rates: Numbers
@@ -123,13 +123,13 @@ def best_cells(
     budget: int,
     taken: NDArray[np.bool_],
 ) -> Cells:
-    """The cells (n,), at most `budget`, that gain most per cell, in order of selection.
+    """Return the cells (n,), at most `budget`, that gain most per cell, in order of selection.
 
-    The first `steps[k]` (K,) cells of set i are worth `gains[i, k]` together (n, K), and all cells
-    of strip s are worth `strip_gains[s]` (S,); `strips` (S, c) are its cells. Gains need not be
-    concave: a set is served in pieces, along the least concave curve above its gains, so that
-    pieces of most gain per cell come first and no piece before an earlier one of its set. `taken`
-    (N,), none before, says in the end what is chosen.
+    The first `steps[k]` (K,) cells of set i are together worth `gains[i, k]` (n, K). All cells of
+    strip s, `strips[s]` (S, c), are worth `strip_gains[s]` (S,). Gains need not be concave: a set
+    is served in pieces, along the least concave curve above its gains. Pieces of most gain per cell
+    then come first, and pieces of a set in order. `taken` (N,), all False before, marks the chosen
+    cells.
     """
     most = len(sizes) * len(steps) + len(strips)
     pieces = _Pieces(np.empty(most, np.float32), np.empty(most, np.int64), np.empty(most, np.int64))
@@ -144,7 +144,7 @@ def best_cells(
         pieces.ends[count] = pieces.begins[count] + strips.shape[1]
         count += 1
 
-    # Among equals the first: the machine's sort does not decide.
+    # Of equal pieces the first: the result does not depend on the machine's sort.
     chosen = np.empty(budget, np.int64)
     found = 0
     for piece in np.argsort(-pieces.rates[:count], kind="mergesort"):
@@ -162,8 +162,8 @@ def best_cells(
 def _cut(
     gains: Numbers, steps: Integers, start: int, size: int, pieces: _Pieces, count: int
 ) -> int:
-    """Add the pieces of one set of `size` cells, the first at `start`, to the `count` that there
-    are. Returns how many there are then.
+    """Add the pieces of one set of `size` cells, the first at `start`, to the `count` pieces.
+    Returns the new count.
     """
     done = 0
     gained = np.float32(0)
@@ -183,8 +183,8 @@ def _cut(
 def _next_corner(
     gains: Numbers, steps: Integers, done: int, size: int, gained: np.float32
 ) -> tuple[np.float32, int]:
-    """The step that gains most per cell after `done` cells, which have `gained` so much, and that
-    gain; -1 where no step gains.
+    """Return the step with the largest gain per cell after `done` cells with `gained`, and that
+    gain; -1 without a gain.
     """
     best = np.float32(0)
     corner = -1
@@ -203,8 +203,8 @@ def _next_corner(
 def needed_cells(
     cells: Cells, sizes: Integers, behind: Integers, objects: int, min_returns: int
 ) -> NDArray[np.int64]:
-    """(n, objects) after how many cells of every set an object has `min_returns` of them, 0 if it
-    never has. `behind` (N,) is the object, from 0, that each cell would return from, -1 for none.
+    """Return (n, objects) the number of cells of every set after which an object has `min_returns`,
+    0 if never. `behind` (N,) is the object, from 0, that each cell would return from, -1 for none.
     """
     needed = np.zeros((len(sizes), objects), np.int64)
     start = 0

@@ -28,11 +28,10 @@ FORMAT = "care-sim weights 1"
 class Card:
     """Description of a file of weights: what it fits, and how it was made.
 
-    `kind` names the policy. `grid` is the one that was trained on. `budget` is the number of cells
-    per keyframe, None if any will do. `setup` is the sensor set-up that was trained with, as a
-    `Rig` tells it. `wrapper` says behind which wrappers the weights were trained, None without.
-    `scenario`, `data`, `seeds`, `steps`, `machine`, `versions` and `result` tell people how the
-    weights were trained and what they reached.
+    `kind` names the policy. `grid` is the grid of the training. `budget` is the number of cells per
+    keyframe, None for any. `setup` is the sensor set-up of the training, as in a `Rig`. `wrapper`
+    names the wrappers of the training, None without. `scenario`, `data`, `seeds`, `steps`,
+    `machine`, `versions` and `result` describe the training and its results for people.
     """
 
     kind: str
@@ -49,7 +48,7 @@ class Card:
     result: Mapping[str, Any] = field(default_factory=dict)
 
     def to_json(self) -> str:
-        """As text that people can read."""
+        """Return readable JSON text."""
         return json.dumps({"format": FORMAT} | asdict(self), indent=1)
 
     @classmethod
@@ -58,9 +57,10 @@ class Card:
         plain = parsed_json(text)
         if not isinstance(plain, dict) or plain.pop("format", None) != FORMAT:
             raise ValueError(f"its card is not of the format {FORMAT!r}")
-        # Cards of earlier versions do not tell the set-up.
+        # Cards of earlier versions do not hold the set-up.
         plain.setdefault("setup", "")
-        # Exactly the fields of a card: what a later form adds might change what the weights mean.
+        # Exactly the fields of a card: fields of a later form might change the meaning of the
+        # weights.
         if wrong := set(plain) ^ {column.name for column in fields(cls)}:
             raise ValueError(f"its card lacks or has too much: {', '.join(sorted(wrong))}")
         for name, value in plain.items():
@@ -102,28 +102,28 @@ class Weights:
     card: Card
 
     def check(self, kind: str, rig: Rig) -> None:
-        """Raise InvalidInput, with what the file has and what is needed, unless the weights are of
-        this kind and fit this rig.
+        """Raise InvalidInput unless the weights are of this kind and fit this rig. The message
+        names what the file has and what is needed.
         """
         card = self.card
         needed: dict[str, Any] = {"kind": kind, "grid": rig.grid}
         needed |= {"budget": rig.budget} if card.budget is not None else {}
         for name, value in needed.items():
             if getattr(card, name) != value:
-                has, wanted = (_told(name, it, rig) for it in (getattr(card, name), value))
+                has, wanted = (_describe(name, it, rig) for it in (getattr(card, name), value))
                 hint = _HINTS.get(name, "")
                 raise InvalidInput(
                     f"weights {self.path}: {name} is {has}, needed is {wanted}{hint}"
                 )
-        # By the hash behind the name. A card or a rig that does not tell its set-up fits any.
+        # By the hash behind the name. A card or a rig without a set-up fits any.
         if len({one.setup.rpartition(" ")[2] for one in (card, rig)} - {""}) > 1:
             raise InvalidInput(
                 f"weights {self.path}: the set-up is {card.setup}, needed is {rig.setup}"
             )
 
     def array(self, name: str, *shape: int | None) -> NDArray[np.float32]:
-        """An array by name; None in `shape` is any length. Raises InvalidInput for a missing one,
-        or another shape.
+        """Return an array by name; None in `shape` is any length. Raises InvalidInput for a missing
+        one, or another shape.
         """
         if name not in self.arrays:
             raise InvalidInput(
@@ -151,13 +151,13 @@ def save_weights(
 
 
 def load_weights(path: str | PathLike[str]) -> Weights:
-    """Read weights. Raises InvalidInput for a file that is missing, damaged or something else."""
+    """Read weights. Raises InvalidInput for a file that is missing, damaged or of another kind."""
     arrays, card = read_arrays(path, Card.from_json, "care-sim train")
     return Weights(Path(path), arrays, card)
 
 
 def shipped_weights(name: str) -> Path:
-    """Where the weights of that name lie that come with the package."""
+    """Return the path of the shipped weights of that name."""
     return Path(__file__).parent / "shipped" / f"{name}.npz"
 
 
@@ -168,7 +168,8 @@ def _grid(plain: dict[str, Any]) -> Grid:
 
 
 def _own_grid(plain: dict[str, Any]) -> AngularGrid:
-    # Cards of earlier versions are of level grids all round in equal steps, and say no more.
+    # Cards of earlier versions belong to level grids of a full turn in equal steps, and hold
+    # nothing more.
     usual = {"field_of_view": 2 * np.pi, "heading": 0.0, "pitch": 0.0, "roll": 0.0}
     numbers = usual | plain
     listed = numbers.pop("listed", [])
@@ -186,12 +187,12 @@ def _wrapping(stored: dict[str, Any] | str | None) -> Wrapping | None:
     return None if stored is None else Wrapping.from_plain(stored)
 
 
-def _told(name: str, value: Any, rig: Rig) -> str:
-    """A value of a card as a reader wants it."""
+def _describe(name: str, value: Any, rig: Rig) -> str:
+    """Return a value of a card in readable form."""
     if name == "budget":
         return f"{value} cells ({value / rig.grid.size:.4g})"
     if isinstance(value, GridStack):
-        told_each = "; ".join(_told(name, head.grid, rig) for head in value.heads)
+        told_each = "; ".join(_describe(name, head.grid, rig) for head in value.heads)
         return f"{len(value.heads)} LiDARs: {told_each}"
     if isinstance(value, AngularGrid):
         told = asdict(value)

@@ -1,1 +1,1 @@
-"""Policies of this project: causal, without learning and without truth, an idea per file."""
+"""Policies of this project: causal, without learning and truth, one idea per file."""

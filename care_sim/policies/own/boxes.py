@@ -13,7 +13,7 @@ from care_sim.policies.own.care import CORE_FIRST
 
 
 class Boxes(Policy):
-    """A few cells of every camera box, then the row at which things enter the range.
+    """Fires a few cells of every camera box, then the row at which objects enter the range.
 
     Each box gets its first `cells` cells, the core first. The row follows, straight ahead first;
     the floor gets the rest. It has no residual and no tracks: a policy that does not beat it owes
@@ -33,6 +33,6 @@ class Boxes(Policy):
         self._row = row[np.argsort(off_ahead, kind="stable")]
 
     def demand(self, belief: Belief) -> Demand:
-        """Layers: the boxes, then the row."""
+        """Return the layers: the boxes, then the row."""
         boxes = self.rig.listed(wedges(belief.detections, self.rig), CORE_FIRST, self._few)
         return Demand(layers=[boxes, [self._row]])

@@ -1,5 +1,5 @@
-"""Policies that spend the reserve of CARE in rounds: as many cells of every set as a detection
-needs, before another set has more.
+"""Policies that spend the reserve of CARE in rounds: every set gets the cells of a detection before
+any set gets more.
 """
 
 from collections.abc import Mapping
@@ -19,14 +19,15 @@ from care_sim.policies.controls.patterns import cells_by_row, entry_cells
 from care_sim.policies.own.sight_lines import SightLines, columns_ahead
 
 CORE_FIRST = "core-spread"
-"""The order of the cells in hulls and wedges (`care_sim.core.cells.order`), unless the rig has one:
-the rim is there for errors of the forecast, without which the object lies in the core alone."""
+"""The default order of the cells in hulls and wedges (`care_sim.core.cells.order`). The rim only
+serves errors of the forecast; without errors the object lies in the core.
+"""
 HULL_CELLS_PER_RETURN = 2
-"""Cells that a hull gets in a round for every return that a detection needs."""
+"""Cells per round of a hull, for every return that a detection needs."""
 WEDGE_CELLS_PER_RETURN = 3
-"""Cells that a wedge gets in a round for every return that a detection needs. Both numbers were
-chosen on the calibration's streets 1000 to 1007 and on streets 2000 to 2007, none of which is
-scored."""
+"""Cells per round of a wedge, for every return that a detection needs. Both numbers were chosen on
+the calibration's streets 1000 to 1007 and on streets 2000 to 2007, none of which is scored.
+"""
 
 
 class Round(NamedTuple):
@@ -37,22 +38,22 @@ class Round(NamedTuple):
 
     @classmethod
     def of(cls, min_returns: int) -> "Round":
-        """Return the round of a detector which needs so many returns. Raises InvalidInput unless
-        they are a whole number of at least 1.
+        """Return the round of a detector that needs this many returns. Raises InvalidInput unless
+        it is a whole number of at least 1.
         """
         check_whole("min_returns", min_returns, 1)
         return cls(HULL_CELLS_PER_RETURN * min_returns, WEDGE_CELLS_PER_RETURN * min_returns)
 
 
 class CareSpread(RowPolicy):
-    """The reserve of CARE, spent otherwise. It asks no more of a set than a detection needs, before
-    another set has had as much.
+    """The reserve of CARE, spent in rounds: every set gets the cells of a detection before any set
+    gets more.
 
     First every unexplained wedge gets a few cells, then every hull; then both get as many again.
-    What is left goes to the floor. Sets are listed with their undilated core first, spread evenly
-    (`core-spread`), unless the rig has an order. All of it is in the reserve layers, in order of
-    priority: the share rho plays no part. `min_returns` is what the proxy needs to detect an
-    object; with another detector it is the default.
+    The rest goes to the floor. Sets begin with their undilated core, spread evenly (`core-spread`),
+    unless the rig has an order. Everything is in the reserve layers, in order of priority: the
+    share rho plays no part. `min_returns` is the number of returns that the proxy needs; other
+    detectors use the default.
     """
 
     name = "care-spread"
@@ -65,7 +66,7 @@ class CareSpread(RowPolicy):
         self._round = Round.of(min_returns)
 
     def stages(self, beliefs: Beliefs) -> list[WorldSets]:
-        """Layers: a round of wedges, a round of hulls, and both again."""
+        """Return the layers: a round of wedges, a round of hulls, and both again."""
         unexplained = unexplained_layer_of(beliefs)
         few, more = self._round
         wedges = self._listed(unexplained, 2 * more)
@@ -79,18 +80,26 @@ class CareSpread(RowPolicy):
         ]
 
     def _listed(self, given: WorldSets, most: int) -> WorldSets:
-        """The first `most` cells of every set, the core first."""
+        """Return the first `most` cells of every set, the core first."""
         return WorldSets(self.rig.listed(given.sets, CORE_FIRST, most), given.counts)
 
 
 class CareSector(Policy):
-    """`care-sightlines` without its memory of lines of sight: the simplest policy that was found as
+    """`care-sightlines` without its memory of lines of sight: the simplest policy found to be as
     good on generated streets.
 
-    In order of priority: a round of unexplained wedges; the sector ahead, in the row at which
-    things enter the range; a round of hulls; a round of explained wedges; the rest of the
-    unexplained ones; the rest of that row; more of the hulls; and the pattern `rows` in the place
-    of the random floor. Without the `residual` every wedge counts as unexplained.
+    In order of priority:
+
+    - a round of unexplained wedges
+    - the sector ahead, in the row at which objects enter the range
+    - a round of hulls
+    - a round of explained wedges
+    - the rest of the unexplained ones
+    - the rest of that row
+    - more of the hulls
+    - the pattern `rows` instead of the random floor
+
+    With `residual=False` every wedge counts as unexplained.
     """
 
     name = "care-sector"
@@ -134,22 +143,29 @@ class CareSector(Policy):
 
 
 WEDGE_ROUNDS = 4
-"""Rounds that an unexplained wedge gets at most. Chosen on the calibration's streets 1000 to 1007
-and on streets 2000 to 2007, none of which is scored."""
+"""Most rounds of an unexplained wedge. Chosen on the calibration's streets 1000 to 1007 and on
+streets 2000 to 2007, none of which is scored.
+"""
 
 
 class CareSightlines(Policy):
-    """`care-spread` with a watch for what no camera box asks for.
+    """`care-spread` that also watches where new objects can appear without a camera box.
 
-    In order of priority: a round of unexplained wedges; the lines of sight ahead along which
-    something can drive into the range (`care_sim.policies.own.sight_lines`); a round of hulls; a
-    round of explained wedges, since a new object can stand in front of a known one; all lines of
-    sight; the rest of the wedges, up to `wedge_rounds` rounds in all, unless the picture is late
-    and says where things were; the rest of the row at which things enter the range; more of the
-    hulls; and the pattern `rows` in the place of the random floor.
+    In order of priority:
 
-    Each idea can be switched off, to see what it does: `camera` (all wedges), `ahead`, `explained`,
-    `sight_lines`, `rows`.
+    - a round of unexplained wedges
+    - lines of sight ahead along which something can drive into the range
+      (`care_sim.policies.own.sight_lines`)
+    - a round of hulls
+    - a round of explained wedges, since a new object can stand in front of a known one
+    - all lines of sight
+    - the rest of the wedges, up to `wedge_rounds` rounds in all, unless the picture is late
+    - the rest of the row at which objects enter the range
+    - more of the hulls
+    - the pattern `rows` instead of the random floor
+
+    Each idea can be switched off: `camera` (all wedges), `ahead`, `explained`, `sight_lines`,
+    `rows`.
     """
 
     name = "care-sightlines"
@@ -190,11 +206,11 @@ class CareSightlines(Policy):
         self.reset()
 
     def reset(self) -> None:
-        """Forget what was seen."""
+        """Forget the memory."""
         self._lines = SightLines(self.rig, self._entries)
 
     def remember(self, belief: Belief) -> None:
-        """Take in the last scan."""
+        """Update the memory with the last scan."""
         self._lines.update(belief)
 
     def demand(self, belief: Belief) -> Demand:

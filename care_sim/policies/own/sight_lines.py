@@ -1,5 +1,5 @@
-"""Where something new can come into view: along lines of sight that are open, and at the edges of
-what hides. And in the sector ahead, where what the car drives towards enters the range of scoring.
+"""Places where new objects can appear: along open lines of sight, at the edges of occluders, and in
+the sector ahead, where objects enter the scored range.
 """
 
 import math
@@ -15,14 +15,15 @@ from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 
 AHEAD_RAD = math.atan(13 / 50)
-"""Half of the sector: at the range of scoring, 50 m, a street of 26 m from house to house, with two
-lanes, parked cars and pavements."""
+"""Half of the sector. At the scored range, 50 m, it covers a street of 26 m from house to house,
+with two lanes, parked cars and pavements.
+"""
 
 
 def columns_ahead(grid: Grid) -> Cells:
-    """(n,) the columns whose middle lies within `AHEAD_RAD` of straight ahead, the nearest to it
-    first; none on a grid whose columns are wider than that. Of several LiDARs those of the second
-    are numbered on from those of the first.
+    """Return (n,) the columns whose middle is within `AHEAD_RAD` of straight ahead, the nearest
+    first; none on a grid with wider columns. Columns of the second of several LiDARs are numbered
+    after those of the first.
     """
     off_ahead = np.abs(np.concatenate([head.grid.azimuths for head in grid.heads]))
     nearest_first = np.argsort(off_ahead, kind="stable")
@@ -31,30 +32,32 @@ def columns_ahead(grid: Grid) -> Cells:
 
 
 OPEN_M = 25.0
-"""A line of sight is open if nothing was met nearer than this, half the range of scoring."""
+"""A line of sight is open if nothing is nearer than this, half the scored range."""
 EDGE_M = 5.0
-"""Two neighbouring columns lie on either side of an edge if their ranges differ by more: about the
-length of a car, behind which another thing has room."""
+"""Neighbouring columns have an edge between them if their ranges differ by more: about the length
+of a car, which leaves room behind it.
+"""
 EDGE_COLUMNS = 4
-"""Columns to either side of an edge that are watched: on the paper's grid 2.8 degrees, 1.5 m at a
-range of 30 m, what a walker covers in a second and a car in a tenth."""
+"""Watched columns on either side of an edge: on the paper's grid 2.8 degrees, or 1.5 m at a range
+of 30 m. A walker covers that in a second, a car in a tenth of one.
+"""
 _NEAREST_M = 1.0
-"""Nothing remembered is nearer: the car itself is there."""
+"""Least remembered range: the car itself is nearer."""
 _LAST_BITS = 1e-9
-"""What rounding may add to a number of columns."""
+"""Allowance for rounding of a number of columns."""
 
 
 class SightLines:
     """A memory of the last range along one of the `cells` (A,) of every column, moved with the car.
-    The columns of several LiDARs come one LiDAR after the other, and each has a memory of its own.
+    The columns of several LiDARs follow each other, each with its own memory.
 
-    What drives into the range enters it at the end of an open line of sight; what was hidden shows
-    itself at an edge. A line along which nothing is remembered counts as open. `ranges` (A,) are
-    metres as of the coming keyframe, the grid's reach where nothing is remembered.
+    Objects drive into the range at the end of an open line of sight; hidden objects appear at an
+    edge. A line without memory counts as open. `ranges` (A,) are metres at the next keyframe, the
+    grid's reach without memory.
 
-    What is remembered moves by whole columns, so that slow turns are not followed until a column is
-    fired again. A lost return looks like an open line. On a dead row (`lidar_dead_rows`) every line
-    is open for ever, and whoever watches it spends cells there for nothing.
+    The memory moves by whole columns, so it misses slow turns until a column is fired again. A lost
+    return looks like an open line. On a dead row (`lidar_dead_rows`) every line stays open, and
+    watching it wastes cells.
     """
 
     ranges: Floats
@@ -68,15 +71,16 @@ class SightLines:
             for n, head in enumerate(rig.grid.heads)
         ]
         self._sector = columns_ahead(rig.grid)
-        # Of a line without a return a scan says the reach in float32, which can be less than it.
+        # For a line without a return a scan holds the reach in float32, which can be less than the
+        # reach.
         self._reach = float(np.float32(rig.grid.range_m))
-        # On a grid of shorter reach, a line without a return is open all the same.
+        # On a grid of shorter reach, a line without a return is also open.
         self._open_m = min(OPEN_M, self._reach / 2)
         self.ranges = np.full(len(cells), self._reach)
-        self._watched = self._worth_a_look()
+        self._watched = self._watched_lines()
 
     def update(self, belief: Belief) -> None:
-        """Take in the last scan, and move what is remembered by what the car has driven since."""
+        """Update the memory with the last scan, and move it by the car's motion since."""
         seen = belief.ranges.ravel()[self._lines]
         np.copyto(self.ranges, seen, where=seen > 0)
         driven = belief.ego.speed * self._keyframe_s
@@ -84,20 +88,18 @@ class SightLines:
         way = driven, turned
         for own, spacing, azimuths in self._heads:
             self.ranges[own] = _moved(self.ranges[own], azimuths, way, self._reach, spacing)
-        self._watched = self._worth_a_look()
+        self._watched = self._watched_lines()
 
     def ahead(self) -> Cells:
-        """Return the cells that are worth a look in the sector ahead, the nearest to straight ahead
-        first.
-        """
+        """Return the watched cells in the sector ahead, the nearest to straight ahead first."""
         return self._cells(self._sector[self._watched[self._sector]])
 
     def cells(self) -> Cells:
-        """All that is worth a look, by ascending column."""
+        """Return all watched cells, by ascending column."""
         return self._cells(np.flatnonzero(self._watched))
 
-    def _worth_a_look(self) -> Mask:
-        """(A,) which lines are open, or near an edge."""
+    def _watched_lines(self) -> Mask:
+        """Return (A,) which lines are open, or near an edge."""
         return np.concatenate(
             [_open_or_edge(self.ranges[own], self._open_m, grid) for own, grid, _ in self._heads]
         )
@@ -111,8 +113,8 @@ class SightLines:
 def _moved(
     ranges: Floats, azimuths: Floats, way: tuple[float, float], reach: float, grid: GridSpacing
 ) -> Floats:
-    """The `ranges` (A,) of things that stand still, after the car has gone a `way`: driven metres
-    ahead, turned radians to the left; `reach` where nothing is left of them.
+    """Return the `ranges` (A,) of standing objects after the car's `way` (metres ahead, radians to
+    the left); `reach` where none is left.
     """
     driven, turned = way
     columns = len(ranges)
@@ -125,10 +127,9 @@ def _moved(
             now = max(math.hypot(x, y), _NEAREST_M)
             middle = math.floor((math.atan2(y, x) - turned - grid.right) / grid.column_width)
 
-            # From nearer, a surface covers more than the one column in which it was met. It is
-            # rounded up, so that no gap opens in a wall: what comes nearer grows by a column on
-            # either side.
-            # Of two that come to lie behind each other the nearer one is seen.
+            # A nearer surface covers more than its one column. The width is rounded up, so that no
+            # gap opens in a wall: an approaching surface grows by a column on either side. Of two
+            # surfaces behind each other the nearer one counts.
             half = math.ceil((before / now - 1) / 2 - _LAST_BITS)
             for covered in range(middle - half, middle + half + 1):
                 place = covered % grid.turn
@@ -139,7 +140,7 @@ def _moved(
 
 @compiled()
 def _open_or_edge(ranges: Floats, open_m: float, grid: GridSpacing) -> Mask:
-    """(A,) which columns are open, or within `EDGE_COLUMNS` of an edge."""
+    """Return (A,) which columns are open, or within `EDGE_COLUMNS` of an edge."""
     columns = len(ranges)
     watched = ranges >= open_m
     for column in range(columns):

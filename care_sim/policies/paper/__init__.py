@@ -1,1 +1,1 @@
-"""The policies of the paper, a family per file."""
+"""The policies of the paper, one family per file."""

@@ -1,5 +1,5 @@
-"""The paper's baselines that ask neither camera nor tracks: the full scan, random cells, fewer
-beams, and full scans that are thinned afterwards and save no sensing.
+"""The paper's baselines without camera and tracks: the full scan, random cells, fewer beams, and
+full scans that are thinned afterwards and save no sensing.
 """
 
 from abc import abstractmethod
@@ -24,24 +24,24 @@ from care_sim.policies.base import FixedPolicy, PrivilegedPolicy
 class MatchedFraction(PrivilegedPolicy):
     """A reference that is not causal (paper, Sec. 5.1).
 
-    It sees the full cloud of P points before it chooses, keeps round(beta P) of them, and so saves
-    no sensing. The rest of the budget goes to
-    cells that return nothing, in ascending order, so that the shared floor adds no point.
+    It chooses from the full cloud of P points, keeps round(beta P) of them, and so saves no
+    sensing. The rest of the budget goes to cells without returns, in ascending order, so that the
+    shared floor adds no point.
     """
 
     tags = ("non-causal",)
 
     @abstractmethod
     def kept(self, cells: Cells, points: Floats, count: int) -> Cells:
-        """`count` of `cells` (P,), which return `points` (P, 3) in the sensor frame."""
+        """Return `count` of the `cells` (P,), which return `points` (P, 3) in the sensor frame."""
 
     def demand(self, belief: Belief) -> Demand:
-        """The kept points, then silent cells."""
+        """Return the kept points, then silent cells."""
         scan = self.truth.full_scan()
         returned = np.isfinite(scan.ranges)
         cells = scan.cells[returned]
         points = self.rig.grid.points(cells, scan.ranges[returned])
-        # beta is the budget over all cells: the belief tells the budget in cells.
+        # The fraction beta is the budget over all cells: the belief holds the budget in cells.
         kept = self.kept(cells, points, round(belief.budget * len(cells) / self.rig.grid.size))
         silent = scan.cells[~returned][: belief.budget - len(kept)]
         return Demand(layers=[[np.sort(kept)], [silent]])
@@ -62,18 +62,18 @@ class Full(FixedPolicy):
             )
 
     def fixed(self, budget: int) -> Demand:
-        """All cells, as one reserve layer: exploitation alone would stop at (1 - rho) B."""
+        """Return all cells as one reserve layer: exploitation alone would stop at (1 - rho) B."""
         return Demand(layers=[[np.arange(self.rig.grid.size)]])
 
 
 class Random(FixedPolicy):
-    """Asks for nothing, so that the shared random floor spends the whole budget."""
+    """Demands nothing, so that the shared random floor spends the whole budget."""
 
     name = "random"
     source = "CARE paper, Sec. 4.1, Algorithm 1 (the floor alone)"
 
     def fixed(self, budget: int) -> Demand:
-        """Nothing."""
+        """Return an empty demand."""
         return Demand()
 
 
@@ -81,8 +81,8 @@ class BeamReduce(FixedPolicy):
     """Beam reduction of LiDAR Distillation (Wei et al., ECCV 2022), as a causal scan policy.
 
     The original drops scan lines from a cloud. The paper (Sec. 5.1) adapts it: whole rows are
-    fired, the nearest to the horizon first. The last row is thinned evenly, so that exactly B cells
-    are asked for.
+    fired, the nearest to the horizon first. The last row is thinned evenly, so that the demand has
+    exactly B cells.
     """
 
     name = "beam-reduce"
@@ -93,17 +93,17 @@ class BeamReduce(FixedPolicy):
         self._rows = horizon_rows(rig.grid, rig.budget)
 
     def fixed(self, budget: int) -> Demand:
-        """One layer per row; no exploitation."""
+        """Return one layer per row, without exploitation."""
         return Demand(layers=[[cells] for cells in self._rows])
 
 
 def horizon_rows(grid: Grid, count: int) -> list[Cells]:
-    """The cells of the rows nearest the horizon, nearest first, `count` in all.
+    """Return `count` cells of the rows nearest to the horizon, nearest first.
 
     The last row is evenly thinned.
     """
-    # The height of a row's unit ray straight ahead orders rows as their elevation does. Rows as far
-    # above the horizon as below keep the order of their index: the upper one first.
+    # The height of a row's unit ray straight ahead orders rows by elevation. Rows equally far above
+    # and below the horizon keep the order of their index: the upper one first.
     rises = [
         head.grid.directions[int(np.argmin(head.grid.from_ahead)) :: grid.columns, 2]
         for head in grid.heads
@@ -122,7 +122,7 @@ class RandomPoints(MatchedFraction):
     """The first reference of the paper (Sec. 5.1): a matched fraction, drawn at random.
 
     `seed` and the cloud decide the draw, so that no two keyframes or episodes share one. The last
-    bits of the cloud differ between processors and do not enter.
+    bits of the cloud, which differ between processors, are ignored.
     """
 
     name = "random-points"
@@ -134,7 +134,7 @@ class RandomPoints(MatchedFraction):
         self._seed = seed
 
     def kept(self, cells: Cells, points: Floats, count: int) -> Cells:
-        """`count` cells at random."""
+        """Return `count` cells at random."""
         rng = np.random.default_rng((self._seed, crc32(portable_bytes(cells, points))))
         return rng.choice(cells, count, replace=False)
 
@@ -153,18 +153,18 @@ class FarthestPoints(MatchedFraction):
 
     def __init__(self, rig: Rig, truth: Truth):
         super().__init__(rig, truth)
-        # A missing extra is told before the episode, not at its first keyframe.
+        # A missing extra is reported before the episode, not at its first keyframe.
         import_open3d()
 
     def kept(self, cells: Cells, points: Floats, count: int) -> Cells:
-        """The `count` cells whose points lie farthest from each other."""
+        """Return the `count` cells whose points lie farthest from each other."""
         from scipy.spatial import cKDTree
 
         if count == 0:
             return cells[:0]
         open3d = import_open3d()
         cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points))
-        # The sample holds points, not their places. Each is its own nearest one.
+        # The sample holds points, not their places. The nearest cloud point of each is itself.
         _, places = cKDTree(points).query(
             np.asarray(cloud.farthest_point_down_sample(count).points)
         )

@@ -33,7 +33,7 @@ class AllCamera(RowPolicy):
         self._unexplained_first = unexplained_first
 
     def stages(self, beliefs: Beliefs) -> list[WorldSets]:
-        """Hulls, then the wedges of all detections, in one layer or in two."""
+        """Return the hulls, then the wedges of all detections, in one layer or in two."""
         if self._unexplained_first:
             return [beliefs.hulls, *camera_layers_of(beliefs)]
         return [beliefs.hulls, wedges_of(beliefs)]
@@ -45,8 +45,8 @@ class Care(RowPolicy):
     It is history plus the layer U of unexplained wedges. Without a camera detection it is the
     history policy, cell for cell.
 
-    `yaw_compensation` says whether wedges, and the match with forecasts, are turned by the car's
-    change of yaw since the picture (Sec. 5.5). Without it a late box is taken as if it were new.
+    With `yaw_compensation`, wedges and the match with forecasts are turned by the car's change of
+    yaw since the picture (Sec. 5.5). Otherwise a late box is treated as new.
     """
 
     name = "care"
@@ -58,7 +58,7 @@ class Care(RowPolicy):
         self._yaw_compensation = yaw_compensation
 
     def stages(self, beliefs: Beliefs) -> list[WorldSets]:
-        """Hulls, then the wedges of the residual."""
+        """Return the hulls, then the wedges of the residual."""
         if not self._yaw_compensation:
             beliefs = beliefs.unturned()
         return [beliefs.hulls, unexplained_layer_of(beliefs)]
@@ -75,7 +75,7 @@ class CarePriority(RowPolicy):
     source = "CARE paper, Sec. 4.2"
 
     def stages(self, beliefs: Beliefs) -> list[WorldSets]:
-        """Hulls, then the layers (U, M)."""
+        """Return the hulls, then the layers (U, M)."""
         return [beliefs.hulls, *camera_layers_of(beliefs)]
 
 
@@ -125,6 +125,6 @@ class CareSbf(Policy):
         self._forgetting.advance(belief.tracks, belief.ego)
 
     def demand(self, belief: Belief) -> Demand:
-        """Full hulls, shrunk hulls, then the layers (U, M)."""
+        """Return full hulls, shrunk hulls, then the layers (U, M)."""
         hulls = self._forgetting.exploitation(belief.tracks)
         return Demand(hulls, camera_layers(belief, self.rig))

@@ -1,5 +1,5 @@
-"""The paper's policies that follow past tracks: history, the same with an undirected reserve
-or one for unexplained returns, and the oracle of the true next poses.
+"""The paper's policies that follow tracks: history, history with an undirected reserve or one for
+unexplained returns, and the oracle of the true next poses.
 """
 
 from functools import lru_cache
@@ -24,26 +24,26 @@ class History(RowPolicy):
     """The base policy of the paper (Sec. 4.1), its re-implementation of history-driven scanning.
 
     The exploitation sets are the dilated hulls of the forecasts, nearest first. The reserve is
-    empty, so the random floor takes what they leave.
+    empty, so the random floor takes the rest.
     """
 
     name = "history"
     source = "CARE paper, Sec. 4.1, after adaptive LiDAR scanning (2026)"
 
     def stages(self, beliefs: Beliefs) -> list[WorldSets]:
-        """Hulls of all forecasts."""
+        """Return the hulls of all forecasts."""
         return [beliefs.hulls]
 
 
 GOLDEN = (np.sqrt(5) - 1) / 2
-"""Multiples of it spread the most evenly round a circle (Kronecker sequence)."""
+"""Golden ratio: its multiples spread most evenly round a circle (Kronecker sequence)."""
 
 
 class HistoryUniform(Policy):
     """The control history+uniform of the paper (Sec. 5.1).
 
-    The whole reserve, rho B cells, goes to one pattern that stays the same over the episode and
-    looks nowhere in particular.
+    The whole reserve, rho B cells, goes to one undirected pattern that stays the same over the
+    episode.
     """
 
     name = "history-uniform"
@@ -56,18 +56,18 @@ class HistoryUniform(Policy):
         self._pattern = uniform_pattern(rig.grid, reserve)
 
     def demand(self, belief: Belief) -> Demand:
-        """Hulls, then the pattern."""
+        """Return the hulls, then the pattern."""
         return Demand(self.rig.hulls(belief.tracks.boxes), [[self._pattern]])
 
 
 @lru_cache(maxsize=8)
 def uniform_pattern(grid: Grid, count: int) -> Cells:
-    """`count` different cells, ascending: as many in every row, evenly spaced. Read-only, since the
-    pattern is kept for the next keyframe.
+    """Return `count` different cells, ascending: equally many per row, evenly spaced. Read-only,
+    since the pattern is kept for the next keyframe.
 
     Each row is shifted against the one above by the golden ratio of its spacing.
     """
-    # The numbers go to the rows as evenly as whole numbers can. Then each one's place in its row.
+    # Divide the cells among rows as evenly as possible, then place them in each row.
     numbers = np.arange(count)
     row = numbers * grid.rows // max(count, 1)
     in_row = np.bincount(row, minlength=grid.rows)
@@ -82,12 +82,13 @@ def uniform_pattern(grid: Grid, count: int) -> Cells:
 
 GROUND_CLEARANCE_M = 0.3
 """Returns lower than this above a level road are ground (the threshold of the Argoverse 2 map API).
-A detector that fits the road's plane knows it better: see
+A detector that fits the road's plane is more exact: see
 `care_sim.perception.cluster.points.KERB_CLEARANCE_M`.
 """
 BOX_MARGIN_M = 0.2
-"""Boxes reach this much further: an error of 1 m/s in the car's own speed moves a box by 0.1 m in a
-keyframe of 0.1 s, and three deviations of a ranging noise of 2 to 3 cm another 0.1 m."""
+"""Margin of boxes. An error of 1 m/s in the car's own speed moves a box by 0.1 m in a keyframe of
+0.1 s. Three deviations of a ranging noise of 2 to 3 cm add another 0.1 m.
+"""
 SHELL_M = 1.0
 """Depth of a layer. Within it cells come in ascending order; finer would only cost time."""
 
@@ -103,7 +104,7 @@ class Uncertainty(Policy):
     source = "CARE paper, Sec. 5.1, after Ancha et al., Light Curtains, ECCV 2020 and RSS 2021"
 
     def demand(self, belief: Belief) -> Demand:
-        """Hulls, then unexplained returns in shells of distance, nearest first."""
+        """Return the hulls, then unexplained returns in shells of distance, nearest first."""
         cells, ranges = self._unexplained(belief)
         # A layer per shell; a layer's one set is taken in ascending order of its cells.
         shell = np.floor(ranges / SHELL_M)
@@ -111,10 +112,10 @@ class Uncertainty(Policy):
         return Demand(self.rig.hulls(belief.tracks.boxes), layers)
 
     def _unexplained(self, belief: Belief) -> tuple[Cells, Floats]:
-        """Cells (n,) and ranges (n,) of the last scan's returns above the ground and outside
+        """Return cells (n,) and ranges (n,) of the last scan's returns above the ground and outside
         detected boxes.
         """
-        # 0 was not fired, and the range of the grid returned nothing.
+        # A range of 0 was not fired; the reach of the grid means no return.
         cells = np.flatnonzero((belief.ranges > 0) & (belief.ranges < self.rig.grid.range_m))
         ranges = belief.ranges.ravel()[cells].astype(np.float64)
         points = self.rig.grid.points(cells, ranges)
@@ -124,8 +125,11 @@ class Uncertainty(Policy):
         return cells[unexplained], ranges[unexplained]
 
     def _detected_boxes(self, belief: Belief) -> Floats:
-        """(n, 7) boxes detected at the last scan, moved back to it, in the sensor frame of then."""
-        # Tracks are forecasts for the coming keyframe: back by their own way, then by the car's.
+        """Return (n, 7) the boxes detected at the last scan, moved back to that time, in the sensor
+        frame of then.
+        """
+        # Tracks are forecasts for the next keyframe: move them back by their own way, then by the
+        # car's.
         seen = belief.tracks.take(belief.tracks.misses == 0)
         boxes = seen.boxes.copy()
         boxes[:, :2] -= seen.velocities * self.rig.keyframe_s
@@ -133,9 +137,8 @@ class Uncertainty(Policy):
 
 
 def _travelled(ego: Ego, duration: float) -> Frame:
-    """The sensor frame of now in that of `duration` seconds ago."""
-    # The speed half way back. A car that has just set off stood before; it did not drive the other
-    # way.
+    """Return the current sensor frame in the frame of `duration` seconds ago."""
+    # The speed half way back. A car that has just set off stood before; it did not reverse.
     mean = ego.speed - ego.acceleration * duration / 2
     way = (max(mean, 0.0) if ego.speed >= 0 else min(mean, 0.0)) * duration
     # An arc of constant yaw rate has a chord in the direction of half the turn. Its length is taken
@@ -145,7 +148,7 @@ def _travelled(ego: Ego, duration: float) -> Frame:
 
 
 def _inside(points: Floats, box: Floats) -> Mask:
-    """(n,) which points (n, 3) lie in the widened box (7,)."""
+    """Return (n,) which points (n, 3) lie in the widened box (7,)."""
     local = np.abs(turned(points - box[:3], -box[6]))
     inside: Mask = np.all(local <= box[3:6] / 2 + BOX_MARGIN_M, axis=1)
     return inside
@@ -154,16 +157,16 @@ def _inside(points: Floats, box: Floats) -> Mask:
 class HistoryOracle(PrivilegedPolicy):
     """The oracle of the paper (Sec. 5.2): history with the true next positions of tracked objects.
 
-    They replace the forecasts. It bounds any learned predictor of regions from above. New objects
-    stay unknown to it.
+    The true positions replace the forecasts. The policy is an upper bound of learned region
+    predictors. New objects stay unknown to it.
     """
 
     name = "history-oracle"
     source = "CARE paper, Sec. 5.2 (oracle variant)"
 
     def demand(self, belief: Belief) -> Demand:
-        """Hulls of the true boxes, nearest first."""
+        """Return the hulls of the true boxes, nearest first."""
         boxes = self.truth.boxes(belief.tracks)
-        # True places may be in another order than the forecasts were; equal ones keep theirs.
+        # True places may be in another order than the forecasts; equal ones keep theirs.
         nearest_first = np.argsort(planar_ranges(boxes), kind="stable")
         return Demand(self.rig.hulls(boxes[nearest_first]))

@@ -1,1 +1,3 @@
-"""Allocators that others published, rebuilt from their texts: an idea a file, with what differs."""
+"""Published allocators of others, rebuilt from their papers: one idea per file, with its
+differences.
+"""

@@ -12,7 +12,7 @@ from care_sim.policies.base import Policy
 MEMBERS = 5
 """Predictions that are compared."""
 MEMORY_S = 1.0
-"""Seconds for which a measured range counts as known."""
+"""Time for which a measured range counts as known, seconds."""
 LEAST_M2 = 1e-4
 """Weight, square metres, that every cell has beside its variance, so that all can be drawn."""
 
@@ -20,15 +20,15 @@ LEAST_M2 = 1e-4
 class AfterGofer(Policy):
     """Sample with a probability proportional to the variance of an ensemble's predicted depths.
 
-    The paper (arXiv 2007.13834) completes the depth of one picture in several phases: it fires some
-    pixels, lets an ensemble of learners predict the others, and draws the pixels of the next phase
-    in proportion to the variance of the predictions.
+    The paper (arXiv 2007.13834) completes the depth of one picture in several phases. It fires some
+    pixels and lets an ensemble of learners predict the others. The pixels of the next phase are
+    drawn in proportion to the variance of the predictions.
 
-    What differs here: a mask is fixed before anything returns, so a phase is a keyframe, and the
-    ranges of the last second are what is known. A member knows a random half of them and predicts
-    the nearest one in the image; the paper's are trained. There is no picture. Draws follow from
-    the number of the keyframe alone. A line without a return has the range of the grid.
-    Ranges stay in their cells while the car moves, and the image ends straight behind the car.
+    Differences here: a mask is fixed before anything returns, so a phase is a keyframe, and the
+    ranges of the last second are known. A member knows a random half of them and predicts the
+    nearest one in the image; the paper's members are trained. There is no picture. Draws depend
+    only on the number of the keyframe. A line without a return has the range of the grid. Ranges
+    stay in their cells while the car moves, and the image ends straight behind the car.
     """
 
     name = "after-gofer"
@@ -41,13 +41,13 @@ class AfterGofer(Policy):
         self.reset()
 
     def reset(self) -> None:
-        """Forget what was measured."""
+        """Forget measured ranges."""
         self._ranges = np.zeros(self.rig.grid.size)
         self._measured = np.full(self.rig.grid.size, -self._keyframes)
         self._keyframe = 0
 
     def remember(self, belief: Belief) -> None:
-        """Take in the last scan."""
+        """Store the last scan."""
         ranges = belief.ranges.ravel()
         fired = ranges > 0
         self._ranges[fired] = ranges[fired]
@@ -55,16 +55,16 @@ class AfterGofer(Policy):
         self._keyframe += 1
 
     def demand(self, belief: Belief) -> Demand:
-        """As many cells as the budget has, drawn without replacement."""
+        """Return the budget's cells, drawn without replacement."""
         rng = np.random.default_rng(self._keyframe)
         variance = np.concatenate([self._variance(head, rng) for head in self.rig.grid.heads])
-        # The highest of logarithms of weights with Gumbel noise are such a draw.
+        # The highest log weights with Gumbel noise are such a draw.
         keys = np.log(variance + LEAST_M2) + rng.gumbel(size=len(variance))
         return Demand(layers=[[np.argsort(-keys, kind="stable")[: belief.budget]]])
 
     def _variance(self, head: Head, rng: np.random.Generator) -> Floats:
-        """(n,) of the members' predictions for the cells of one LiDAR, square metres; 0 while a
-        member knows nothing.
+        """Return (n,) the variance of the members' predictions for the cells of one LiDAR, square
+        metres; 0 while a member knows nothing.
         """
         from scipy.ndimage import distance_transform_edt
 

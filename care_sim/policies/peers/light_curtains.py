@@ -1,4 +1,4 @@
-"""Curtains of rays where most is uncertain, after Ancha et al., ECCV 2020."""
+"""Curtains of rays at the most uncertain places, after Ancha et al., ECCV 2020."""
 
 import math
 
@@ -15,28 +15,28 @@ from care_sim.policies.base import Policy
 PLACES = 25
 """Places along every column, to the range of the grid: 2 m apart on the paper's."""
 BODY_M = (0.3, 1.8)
-"""Heights above the road at which a ray would meet somebody."""
+"""Heights above the road at which a ray would meet a body."""
 FORGETS_S = 1.0
-"""Time in which a place that was seen becomes uncertain again, to 1 - 1/e."""
+"""Time in which a seen place becomes uncertain again, to 1 - 1/e."""
 STEP = 2
-"""Places by which a curtain may come nearer or go away from a column to the next. It stands for the
-speed of the device's mirror, which no LiDAR here has."""
+"""Places by which a curtain may change between neighbouring columns. It models the speed of the
+device's mirror, which no LiDAR here has.
+"""
 
 
 class AfterAncha(Policy):
     """Place light curtains, each where it resolves the most uncertainty.
 
-    A curtain stands at one distance in every column, and sees who stands there. The paper (arXiv
-    2008.02191) chooses the curtain along which the entropies of a detector's anchors have the
-    largest sum: limits of the mirror are edges of a graph, and dynamic programming finds the best
-    path. Curtains follow one another.
+    A curtain has one distance in every column, and detects bodies there. The paper (arXiv
+    2008.02191) chooses the curtain with the largest sum of the entropies of a detector's anchors.
+    Limits of the mirror are edges of a graph, and dynamic programming finds the best path. Curtains
+    follow one another.
 
-    What differs here: a curtain costs the cells whose rays pass its places at the height of a body,
-    and they see what is nearer as well. Entropies are of places that were seen and become uncertain
-    again, not of a trained detector. Places stand for anchors, which lie evenly on the ground, so
-    that far ones count for more. All curtains of a keyframe are placed before anything returns. Of
-    a curtain that the budget cannot pay, the part that resolves the most is fired. The camera plays
-    no part, as in the paper.
+    Differences here: a curtain costs the cells whose rays pass its places at the height of a body,
+    and these rays also see nearer bodies. Entropies belong to places that become uncertain again,
+    not to a trained detector. Places replace anchors, which lie evenly on the ground, so far places
+    count for more. All curtains of a keyframe are placed before anything returns. If the budget
+    cannot pay a curtain, its most useful part is fired. The camera plays no part, as in the paper.
     """
 
     name = "after-ancha"
@@ -52,11 +52,11 @@ class AfterAncha(Policy):
         self.reset()
 
     def reset(self) -> None:
-        """Nothing has been seen."""
+        """Forget seen places."""
         self._uncertain = [np.ones(passed.shape[1:]) for passed in self._passed]
 
     def remember(self, belief: Belief) -> None:
-        """Take in what the last scan saw, and age it."""
+        """Update the memory with the last scan, and age it."""
         kept = math.exp(-self.rig.keyframe_s / FORGETS_S)
         for n, head in enumerate(self.rig.grid.heads):
             ranges = belief.ranges.ravel()[head.cells].reshape(head.grid.shape)
@@ -64,7 +64,9 @@ class AfterAncha(Policy):
             self._uncertain[n] = 1 - kept * (1 - self._moved(self._uncertain[n], head, belief))
 
     def demand(self, belief: Belief) -> Demand:
-        """Curtains, one after the other, until the budget is spent. Several LiDARs take turns."""
+        """Return curtains, one after the other, until the budget is spent. Several LiDARs take
+        turns.
+        """
         worth = [one * area for one, area in zip(self._uncertain, self._areas, strict=True)]
         fired = [np.zeros(head.grid.shape, np.bool_) for head in self.rig.grid.heads]
         curtains: list[Cells] = []
@@ -80,14 +82,14 @@ class AfterAncha(Policy):
         return Demand(layers=[[curtain] for curtain in curtains])
 
     def _passed_by(self, head: Head) -> Mask:
-        """(e, A, PLACES) the places that each cell's ray passes at the height of a body."""
+        """Return (e, A, PLACES) the places that each cell's ray passes at the height of a body."""
         rises = np.tan(head.grid.elevations_everywhere)[..., None]
         heights = self.rig.sensor_height_m + head.place[2] + rises * self._places
         passed: Mask = (heights > BODY_M[0]) & (heights < BODY_M[1])
         return np.broadcast_to(passed, (*head.grid.shape, PLACES)).copy()
 
     def _moved(self, uncertain: Floats, head: Head, belief: Belief) -> Floats:
-        """(A, PLACES) what is known of the places of now, where they were before the car's way."""
+        """Return (A, PLACES) the memory moved by the car's way."""
         azimuths = head.grid.azimuths[:, None] + belief.ego.yaw_rate * self.rig.keyframe_s
         x = self._places * np.cos(azimuths) + belief.ego.speed * self.rig.keyframe_s
         y = self._places * np.sin(azimuths)
@@ -101,8 +103,9 @@ class AfterAncha(Policy):
 
 
 def _curtain(passed: Mask, worth: Floats, fired: Mask, budget: int) -> tuple[Integers, Integers]:
-    """Rows and columns (n,) of the next curtain's cells that are not `fired` (e, A) yet. They are
-    then, and places lose their `worth` (A, PLACES) if all rays that could see them fire.
+    """Return rows and columns (n,) of the next curtain's cells that are not `fired` (e, A) yet, and
+    mark them as fired. Places lose their `worth` (A, PLACES) once all rays that could see them
+    fire.
     """
     path = _best_path(worth, STEP)
     columns = np.arange(len(path))
@@ -118,8 +121,8 @@ def _curtain(passed: Mask, worth: Floats, fired: Mask, budget: int) -> tuple[Int
 
 @compiled()
 def _see(uncertain: Floats, passed: Mask, ranges: np.ndarray, places: Floats) -> None:
-    """Take the uncertainty (A, PLACES) from the places before the `ranges` (e, A), metres, 0 of a
-    cell that was not fired.
+    """Remove the uncertainty (A, PLACES) of the places before the `ranges` (e, A), metres, 0 for
+    cells that were not fired.
     """
     for row in range(ranges.shape[0]):
         for column in range(ranges.shape[1]):
@@ -130,7 +133,7 @@ def _see(uncertain: Floats, passed: Mask, ranges: np.ndarray, places: Floats) ->
 
 @compiled()
 def _best_path(worth: Floats, step: int) -> Integers:
-    """(A,) the place in every column of the path of most `worth` (A, PLACES), by dynamic
+    """Return (A,) the place in every column of the path of most `worth` (A, PLACES). Dynamic
     programming over the constraint graph: places change by up to `step` between columns.
     """
     columns, places = worth.shape
@@ -153,8 +156,8 @@ def _best_path(worth: Floats, step: int) -> Integers:
 
 @compiled()
 def _best_part(worth: Floats, costs: Integers, budget: int) -> tuple[int, int]:
-    """The first column and the one after the last of those that lie side by side, cost no more than
-    the budget, and are worth most; of equals the first.
+    """Return the begin and end of the most valuable adjacent columns within the budget, the first
+    of equal ones.
     """
     most, part = 0.0, (0, 0)
     first, cost, gain = 0, 0, 0.0

@@ -1,6 +1,4 @@
-"""Dense rays in regions that are predicted, sparse ones elsewhere, after Shoouri et al., AAAI
-2026.
-"""
+"""Dense rays in predicted regions, sparse ones elsewhere, after Shoouri et al., AAAI 2026."""
 
 from care_sim.base.checks import check_number
 from care_sim.core.allocation import half_up
@@ -13,20 +11,20 @@ from care_sim.policies.base import Policy
 from care_sim.policies.paper.tracks import uniform_pattern
 
 SPARSE = 0.2
-"""Share of the budget that looks everywhere. The paper gives none."""
+"""Share of the budget for the whole grid. The paper gives none."""
 
 
 class AfterShoouri(Policy):
     """Scan densely where past scans and the camera predict objects, and sparsely elsewhere.
 
-    The paper (arXiv 2508.01562) distils past LiDAR and camera features into queries, from which a
-    mask generator, trained with the detector, draws binary masks of the regions of interest. It
-    saves 65% of a scan, and says nothing of budgets under 35%.
+    The paper (arXiv 2508.01562) distils past LiDAR and camera features into queries. A mask
+    generator, trained with the detector, draws binary masks of regions of interest from them. It
+    saves 65% of a scan, and does not report budgets under 35%.
 
-    What differs here: regions follow from boxes, not from features. They are the hulls of the
-    forecasts and the wedges of all camera boxes, explained or not. Where the budget is below what
-    they hold, each gets a cell in turn, its rows from the top. `sparse` is the share of the budget
-    that an even pattern gets, first of all. Raises InvalidInput for a share outside 0 to 1.
+    Differences here: regions follow from boxes, not from features. They are the hulls of the
+    forecasts and the wedges of all camera boxes, explained or not. If the budget is too small,
+    regions get a cell each in turn, their rows from the top. An even pattern gets the share
+    `sparse` of the budget first. Raises InvalidInput for a share outside 0 to 1.
     """
 
     name = "after-shoouri"
@@ -38,7 +36,7 @@ class AfterShoouri(Policy):
         self._sparse = sparse
 
     def demand(self, belief: Belief) -> Demand:
-        """Layers: the even pattern, the regions, and a pattern of the whole budget."""
+        """Return the layers: the even pattern, the regions, and a pattern of the whole budget."""
         grid, budget = self.rig.grid, belief.budget
         regions = CellSets.joined(
             [self.rig.hulls(belief.tracks.boxes), wedges(belief.detections, self.rig)]

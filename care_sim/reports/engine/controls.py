@@ -1,4 +1,4 @@
-"""Which policies are the controls that a contender has to beat, and which of them is the best."""
+"""Controls that a contender has to beat, and the best of them."""
 
 from collections.abc import Mapping
 
@@ -7,11 +7,11 @@ from care_sim.reports.engine.measures import Measure, Recall, Units
 from care_sim.reports.formatting import MARKS
 
 BEST_CONTROL = "best control"
-"""What the line begins with that names it at every budget."""
+"""Begin of the line that names the control at every budget."""
 
 
 def named_by_budget(controls: Mapping[float, str]) -> str:
-    """The best control of each budget, in words: each control once, with its budgets."""
+    """Return the best control of each budget, in words: each control once, with its budgets."""
     if len({*controls.values()}) == 1:
         return f"{next(iter(controls.values()))} at every budget"
     budgets: dict[str, list[str]] = {}
@@ -21,13 +21,14 @@ def named_by_budget(controls: Mapping[float, str]) -> str:
 
 
 def is_control(tags: tuple[str, ...]) -> bool:
-    """Whether a policy with these tags is a control that a car can have."""
-    # What looks the episode up, or knows the truth, is a warning or a bound, and nothing to beat.
+    """Return True if a policy with these tags is a control that a car can have."""
+    # A policy that looks the episode up, or knows the truth, is a warning or a bound, and no
+    # reference to beat.
     return "control" in tags and not {*tags} & {*MARKS}
 
 
 def best_control(levels: Mapping[str, float | None]) -> str | None:
-    """The control of the highest level, of equal ones the first; None where no level is known."""
+    """Return the control of the highest level, the first of equal ones; None without levels."""
     known = {policy: level for policy, level in levels.items() if level is not None}
     return max(known, key=lambda policy: known[policy], default=None)
 

@@ -63,7 +63,7 @@ class Frame:
 
     def tallies(self, key: Key, within: str = "") -> Tallies:
         """The mean tally over floor seeds of every scene that was played with all of them."""
-        # Every table asks for the same tallies again.
+        # Cached: tables share tallies.
         if (key, within) not in self._tallies:
             self._tallies[key, within] = averaged(by_floor_seed(self.of(key), within))
         return self._tallies[key, within]
@@ -75,7 +75,7 @@ class Frame:
         return measure.units(self.of(key))
 
     def contrast(self, measure: Measure | Recall, ours: Key, theirs: Key) -> Contrast | None:
-        """One cell minus another, paired by unit; None where they share none."""
+        """Return one cell minus another, paired by unit; None without shared units."""
         return contrast(measure, self.units(measure, ours), self.units(measure, theirs))
 
     def marked(self, policy: str) -> str:

@@ -15,19 +15,19 @@ from care_sim.study.rows.reading import Key, Setting, detections, tags_of_row
 from care_sim.study.run_config import FULL, Row
 
 NO_ACTOR = Quartiles(None, None, None, 0)
-"""Of a cell whose drives all meet nobody."""
+"""Text of a cell whose drives have no meetings."""
 
 
 @dataclass(frozen=True)
 class Cell:
     """A policy at a budget in a setting of the closed loop. Distances in metres.
 
-    `tags` of the policy; `met` counts the episodes with a first-sighting actor, `never` those of
-    them without a detection, and `detection` is over them; `closest_pass` and
-    `clearance` are over the episodes in which the actor came into the camera's view, None when
-    there are none. `regret`: detection distance of the full scan of the same world minus this
-    policy's, 0 at best, and `as_full` the episodes in which the policy detects no later; None for
-    `full` and without it.
+    `tags` are the policy's. `met` counts the episodes with a first-sighting actor, `never` those of
+    them without a detection, and `detection` is over them. `closest_pass` and `clearance` are over
+    the episodes in which the actor came into the camera's view, None without any. `regret` is the
+    detection distance of the full scan in the same world minus this policy's, 0 at best. `as_full`
+    counts the episodes in which the policy detects no later. Both are None for `full` and without
+    it.
     """
 
     setting: Setting
@@ -47,7 +47,7 @@ class Cell:
 
     @property
     def key(self) -> Key:
-        """Where its rows are found."""
+        """Key of its rows."""
         return self.setting, self.policy, self.budget
 
 

@@ -20,18 +20,20 @@ from care_sim.study.rows.reading import detection, is_avoided
 from care_sim.study.run_config import Row
 
 GATE_M = 2.5
-"""What the ego covers at 30 km/h (8.33 m/s) while the controller's brake builds up (0.3 s); an
-earlier detection by less buys less than the reaction.
+"""Way of the ego at 30 km/h (8.33 m/s) while the controller's brake builds up (0.3 s). An earlier
+detection by less gains less than the reaction time.
 """
 GATE_POINTS = 5.0
 """The gate of the paper (Sec. 5.2), fixed there before the runs."""
 GATE_COLLISION_POINTS = 10.0
-"""Of the collisions that a full scan prevents; stated before a world was validated."""
+"""Smallest share of the collisions that a full scan prevents; stated before a world was
+validated.
+"""
 
 HEADINGS = {FIRST_SIGHTING: "First sightings", OVERALL: "Overall recall", TTFD: "Censored TTFD"}
 
 Units = Mapping[Any, Any]
-"""What was measured by unit: a `Reading` per seed, or a `Tally` per scene."""
+"""Measurements by unit: a `Reading` per seed, or a `Tally` per scene."""
 _TALLY = tuple(field.name for field in fields(Tally))
 
 

@@ -10,9 +10,9 @@ from care_sim.reports.formatting import interval
 from care_sim.reports.table import Table, TableRow
 
 PAPER = "(paper)"
-"""What the line under a policy begins with that holds the paper's numbers."""
+"""Begin of the line under a policy that holds the paper's numbers."""
 OfPaper = Callable[[Measure | Recall, str], Sequence[str]]
-"""What the paper says of a policy in a measure, budget by budget; empty where it says nothing."""
+"""Returns the paper's claims about a policy in a measure, budget by budget; empty without any."""
 
 
 def under_headings(lines: Mapping[str, Iterable[TableRow]]) -> tuple[TableRow, ...]:

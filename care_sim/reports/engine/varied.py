@@ -1,5 +1,5 @@
-"""A study that varies one thing, in either loop: every cell under every condition, what a condition
-adds to the usual one, and the lead of one policy over the others.
+"""A study that varies one factor, in either loop. Its tables: every cell under every condition,
+differences from the usual condition, and the lead of one policy over the others.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence

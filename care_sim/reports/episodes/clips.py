@@ -45,8 +45,8 @@ class Clip:
     does nothing.
 
     The clip begins `start` seconds after the episodes do. Raises InvalidInput for a negative start
-    or a start without a path, for a folder and for an ending that no clip has, MissingExtra for one
-    whose library is not installed.
+    or a start without a path, for a folder and for another ending. Raises MissingExtra for an
+    ending whose library is not installed.
     """
 
     def __init__(self, path: Path | None, start: float | None = None, panels: bool = False):
@@ -86,8 +86,8 @@ class Clip:
             _write_outcome(self._films[-1][-1], row)
 
     def write(self) -> bool:
-        """Write the clip, one picture per keyframe, at the speed of the world. Says whether there
-        was anything to write.
+        """Write the clip, one picture per keyframe, at the speed of the world. Returns False if
+        there was nothing to write.
 
         An episode that ends before the others, or before the clip starts, keeps its last picture.
         One without a keyframe is left out.

@@ -1,4 +1,4 @@
-"""One picture of an episode: of the moment that matters, or of a time."""
+"""One picture of an episode: at its main moment, or at a given time."""
 
 import sys
 from collections.abc import Mapping
@@ -24,10 +24,10 @@ _ROUNDING_S = 1e-6
 class Photo:
     """Writes one picture of an episode of either loop to `path`; without a path it does nothing.
 
-    It shows the first keyframe that is `at` seconds or later, as its own clock tells; without `at`
-    the first at which the car brakes, of the open loop the first at which somebody appears. Raises
-    InvalidInput for a time without a path, a negative one and another ending than .png, and what
-    `care_sim.base.files.check_output` raises.
+    It shows the first keyframe at or after `at` seconds on its own clock. By default it shows the
+    first keyframe at which the car brakes, in the open loop the first at which an object appears.
+    Raises InvalidInput for a time without a path, a negative one and another ending than .png, and
+    as `care_sim.base.files.check_output` does.
     """
 
     def __init__(self, path: Path | None, at: float | None = None):
@@ -60,13 +60,13 @@ class Photo:
             self._taken = True
 
     def report(self) -> None:
-        """Tell on stderr that there was nothing to take a picture of."""
+        """Report on stderr that there was no moment for a picture."""
         if self._path is not None and not self._taken:
             print(f"{self._nobody}: no picture", file=sys.stderr)
 
 
 class _Watched(Watching):
-    """Hands every keyframe to a photographer."""
+    """Passes every keyframe to a photographer."""
 
     def __init__(self, env: GymEnv, policy: Policy, photo: Photo):
         super().__init__(env, policy)

@@ -50,7 +50,7 @@ SCENE_LABELS = {
     "object_frames": "object frames",
     "overall_recall": "found %",
 }
-"""How the fields of `SceneOutcome` are told."""
+"""Labels of the fields of `SceneOutcome`."""
 _Frame = TypeVar("_Frame")
 
 
@@ -98,7 +98,7 @@ def episode_timeline(config: EpisodeConfig, row: Row, keyframes: Sequence[Keyfra
     changes = [n for n in range(1, len(states)) if states[n] != states[n - 1]]
     frames = with_gaps(keyframes, [*changes, *(n - 1 for n in changes)])
     encounters = enumerate(row.get("encounters", ()), 1)
-    # What the seed drew, and the outcome, of a drive the whole one but for its encounters.
+    # The seed's draws, and the outcome; for a drive the whole outcome without its encounters.
     drawn = [name for name in row if name.startswith("drawn.")]
     told = [*drawn, *(name for name in DriveOutcome.__dataclass_fields__ if name != "encounters")]
     return Timeline(
@@ -114,7 +114,7 @@ def episode_timeline(config: EpisodeConfig, row: Row, keyframes: Sequence[Keyfra
 
 
 def scene_timeline(config: PlayConfig, played: PlayedScene) -> Timeline:
-    """Return the timeline of a play of the open loop: who appears, and who was found when."""
+    """Return the timeline of a play of the open loop: appearing objects, and their detections."""
     row, keyframes, score = played
     frames = with_gaps(keyframes, [n for n, frame in enumerate(keyframes) if frame.entries])
     return Timeline(
@@ -146,7 +146,7 @@ def with_gaps(keyframes: Sequence[_Frame], events: Iterable[int]) -> list[_Frame
 
 
 def encounter_text(encounter: Row, keyframes: Sequence[Keyframe]) -> str:
-    """Say who came, from where, and how it ended. `encounter` holds the fields of
+    """Return who came, from where, and how the encounter ended. `encounter` holds the fields of
     `care_sim.loops.records.EncounterOutcome`, times are those of the `keyframes`.
     """
     known = "reported" if encounter["occluder_reported"] else "unreported"
@@ -188,7 +188,7 @@ def _found(ttfd: int) -> str:
 
 
 def outcome_text(row: Row, name: str) -> str:
-    """A field of the outcome of a play as people read it: recalls in percent."""
+    """Return a field of a play's outcome as text: recalls in percent."""
     value = row[name]
     if value is not None and name.endswith("recall"):
         return f"{100 * value:.1f}"
@@ -196,7 +196,7 @@ def outcome_text(row: Row, name: str) -> str:
 
 
 def text(value: bool | int | float | None) -> str:
-    """A result as people read it."""
+    """Return a result as text."""
     if value is None:
         return "-"
     # Before numbers: bool is a subclass of int.

@@ -15,13 +15,13 @@ from care_sim.study.benchmark.budgets import BudgetResult
 
 BUDGETS_FIGURE = "b90"
 _LINES = ("-", "--", ":", "-.")
-"""Of the entries of one policy, which share its colour."""
+"""Line styles of the entries of one policy, which share its colour."""
 
 
 @default_style()
 def budgets_figure(results: Sequence[BudgetResult]) -> Figure:
-    """Draw a row of panels per part, a panel per count and a curve per result: the share of a full
-    scan's count over the share of the cells that fire.
+    """Draw a row of panels per part, a panel per count and a curve per result. Axes: share of a
+    full scan's count over share of fired cells.
     """
     ordered = sorted_by_budget(results)
     parts = ordered[0].parts

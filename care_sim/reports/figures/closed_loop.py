@@ -1,4 +1,4 @@
-"""Curves of the studies of the closed loop: which rows each figure draws, and by what."""
+"""Curves of the studies of the closed loop."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -55,7 +55,7 @@ def _clearance(rows: Sequence[Row]) -> Point | None:
 
 
 def _percent(column: str) -> _Read:
-    """In how many episodes a flag is set, in per cent."""
+    """Return the share of episodes with a flag, in per cent."""
     return lambda rows: Point(100.0 * total(rows, column) / len(rows)) if rows else None
 
 
@@ -91,8 +91,8 @@ def _sweep_figure(part: Part) -> dict[str, Figure]:
 
 
 def firing_figures(rows: Sequence[Row]) -> dict[str, Figure]:
-    """First detection of the policy that knows its hardware, a panel per sensor set-up and a curve
-    per unit that fires as a whole; none where it was not played at several budgets.
+    """Draw first detections of the policy that knows its hardware, with a panel per sensor set-up
+    and a curve per firing unit. No figure without several budgets.
     """
     budgets = sorted({row["budget"] for row in rows if row["policy"] == AWARE})
     if len(budgets) < 2:
@@ -157,8 +157,8 @@ _ORDER_PLACES = (
     Place("dense", 0.03),
     Place("dense", 0.05),
 )
-"""The dart-out at the tightest budget of the study and at the one that the paper reports; the dense
-street at the tightest, and at the one from which the reserves converge in the paper.
+"""The dart-out at the study's tightest budget and at the paper's reported one. The dense street at
+the tightest, and at the one from which the paper's reserves converge.
 """
 
 

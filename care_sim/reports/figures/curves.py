@@ -23,7 +23,7 @@ MOST_NAMED = 7
 """Curves of a panel that have a name and a colour."""
 BUDGET = "budget (share of cells fired)"
 _CEILINGS = (FULL_SCAN, BEST_CONTROL)
-"""What others are held against is dashed."""
+"""Dashed curves: references of comparison."""
 _FIRST = (REFERENCE, "history", "all-camera", *_CEILINGS)
 _RULE = "named: the paper's policies, the best control, the best others by mean; grey: all others"
 _HOLLOW = "hollow, at 0: not detected"

@@ -1,5 +1,5 @@
 """Maps of the studies: differences by crowding and by ablation, verdicts on headline orders, and
-what is avoided in the Euro NCAP tests and in the cut-ins of UN Regulation 157.
+avoided collisions in the Euro NCAP tests and in the cut-ins of UN Regulation 157.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -224,7 +224,7 @@ def realism_figures(rows: Sequence[Row]) -> dict[str, Figure]:
 
 
 def open_realism_figures(rows: Sequence[Row]) -> dict[str, Figure]:
-    """The same of the open loop."""
+    """Draw how every headline order of the open loop fares under every condition."""
     return _realism("realism-open-loop", RealismStudy(rows))
 
 

@@ -31,7 +31,7 @@ def name_ends(figure: Figure, ends: Mapping[Axes, Mapping[str, tuple[float, str]
     """
     names = {axes: [*map(partial(_name, axes), own, own.values())] for axes, own in ends.items()}
     # Heights on paper are known once the names have taken their room.
-    with texts_as_they_are(figure):
+    with allow_any_text(figure):
         figure.draw_without_rendering()
     figure.set_layout_engine("none")
     points = _INCH_POINTS / figure.dpi
@@ -66,9 +66,9 @@ def apart(heights: Sequence[float], least: float, low: float, high: float) -> li
 
 
 INK = "#757575"
-"""Of texts and axes: a grey with a contrast of 4.5 to white and to black alike."""
+"""Colour of texts and axes: a grey with a contrast of 4.5 to both white and black."""
 CALM = "#999999"
-"""Of curves that only give the background."""
+"""Colour of background curves."""
 BLUE, ORANGE, GREEN, YELLOW = "#0072B2", "#D55E00", "#00946B", "#C28100"
 """From the palette of Okabe and Ito (2008), safe for the colour-blind; two are darkened, so that
 names in these colours are read on white, too.
@@ -162,7 +162,7 @@ def save(figure: Figure, stem: Path) -> None:
     are.
     """
     drawing = svg_text(figure, stem.name)
-    with default_style(), texts_as_they_are(figure):
+    with default_style(), allow_any_text(figure):
         with replacing(stem.with_name(f"{stem.name}.png")) as unfinished:
             figure.savefig(unfinished, dpi=200)
         with replacing(stem.with_name(f"{stem.name}.svg")) as unfinished:
@@ -176,15 +176,15 @@ def svg_text(figure: Figure, name: str) -> str:
     drawn = StringIO()
     # Ids within an SVG are random without a salt.
     salt: dict[Any, Any] = {"svg.hashsalt": printable(name)}
-    with default_style(), rc_context(salt), texts_as_they_are(figure):
+    with default_style(), rc_context(salt), allow_any_text(figure):
         figure.savefig(drawn, format="svg", transparent=True, metadata=_NO_METADATA)
     return _UNUSED_ID.sub("", drawn.getvalue())
 
 
 @contextmanager
-def texts_as_they_are(figure: Figure) -> Iterator[None]:
-    """Within it the figure can be drawn with any texts: a $ in a name begins no formula, control
-    codes are shown as escapes, and what the font has no sign for is drawn as a box.
+def allow_any_text(figure: Figure) -> Iterator[None]:
+    """Draw figures with any texts within the block. A $ in a name begins no formula, control codes
+    become escapes, and unknown characters become boxes.
     """
     # Labels of ticks are Matplotlib's own, and powers of ten among them are formulas.
     of_ticks = {id(label) for tick in figure.findobj(Tick) for label in tick.findobj(Text)}

@@ -22,7 +22,7 @@ from care_sim.evaluation.sightings import RANGE_M
 from care_sim.reports.engine.tables import PAPER
 from care_sim.reports.figures.styles import default_style, svg_text
 from care_sim.reports.formatting import NOT_DETECTED
-from care_sim.reports.page.episodes import Episode, episodes_to_watch, played_again
+from care_sim.reports.page.episodes import Episode, episodes_to_watch, replay_episodes
 from care_sim.reports.page.listing import episode_groups, replay_data
 from care_sim.reports.report import read_results
 from care_sim.reports.study import Study
@@ -133,7 +133,9 @@ def description_in(folder: Path) -> tuple[dict[str, Any], list[str]]:
 
 
 WATCHED = (EPISODES, VEHICLE, PLAYS)
-"""What can be played again to be watched. A row of the mechanism is no play by itself."""
+"""Kinds of results that can be played again to watch. A row of the mechanism is no play by
+itself.
+"""
 _STYLE_ELEMENT = re.compile(r"<style.*?</style>", re.DOTALL)
 _ASSETS = Path(__file__).with_name("assets")
 
@@ -246,7 +248,7 @@ def write_page(
     MissingExtra without the libraries.
     """
     rows, study, left_out = read_results(folder)
-    # Opened before anything is played: a path that cannot be written is told at once.
+    # Opened before anything is played, so that an unwritable path is reported at once.
     with replacing(path, HTML) as unfinished:
         if source is not None and study.results is not PLAYS:
             raise InvalidInput(f"--source is for plays of the open loop, and {folder} holds none")
@@ -257,7 +259,7 @@ def write_page(
             rest = f" (--episodes {len(rows)}: all)" if len(watched) < len(rows) else ""
             again = counted(len(watched), "episode")
             print(f"playing {again} again to be watched{rest}", file=sys.stderr)
-        episodes = played_again(watched, workers, make_executor, source)
+        episodes = replay_episodes(watched, workers, make_executor, source)
         page = Page(folder.resolve().name, study, rows, findings, about, episodes)
         unfinished.write_text(page.html(), encoding="utf-8")
     return page

@@ -1,6 +1,4 @@
-"""The episodes of a page: which are played again, and whether they go as they did when the results
-were made.
-"""
+"""The episodes of a page: those played again, and whether they equal the results."""
 
 import math
 from collections.abc import Sequence
@@ -58,9 +56,9 @@ class Episode:
 
 
 def episodes_to_watch(rows: Sequence[Row], most: int) -> list[Row]:
-    """At most so many rows: all of the first seed, of the open loop of the first scene, then those
-    of the next, so that policies can be seen side by side. Of a scene the full scan comes first,
-    then budget by budget.
+    """Return at most this many rows: all of the first seed, in the open loop of the first scene,
+    then of the next. So policies can be watched side by side. Within a scene the full scan comes
+    first, then budget by budget.
     """
     scenes = {name: n for n, name in enumerate(dict.fromkeys(row.get("scene") for row in rows))}
 
@@ -74,7 +72,7 @@ def episodes_to_watch(rows: Sequence[Row], most: int) -> list[Row]:
     return sorted(rows, key=turn)[:most]
 
 
-def played_again(
+def replay_episodes(
     rows: Sequence[Row],
     workers: int,
     make_executor: ExecutorFactory = processes,

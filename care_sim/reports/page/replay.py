@@ -1,5 +1,4 @@
-"""An episode played again to be watched: what moved, what was seen and found, and what the policy
-knew.
+"""An episode played again to watch: motions, detections, and the policy's knowledge.
 
 Everything is in the world frame and in the numbers of `care_sim.reports.page.story`.
 """
@@ -32,8 +31,8 @@ from care_sim.world.bodies import CATALOGUE
 _WAY_STEP_M = 2.0
 """Between two points of the way: on a turn of 7 m the line between them is 7 cm off."""
 _AWAY, _BEYOND, _MISSED, _FOUND = ".012"
-"""How it stands with an object of a film at a keyframe: not annotated, beyond the range that is
-scored, not found, found.
+"""States of a film's object at a keyframe: not annotated, beyond the scored range, not detected,
+detected.
 """
 _WALL_M = 0.5
 """Side of the squares in which walls are drawn: a scene has about a thousand."""
@@ -71,7 +70,7 @@ class Recorder:
         self._seen: list[set[int]] = []
 
     def before(self, loop: OneWorld | OpenLoop) -> None:
-        """Take down what there is and what is known before the coming keyframe."""
+        """Record the bodies and the policy's knowledge before the next keyframe."""
         self.loop = loop
         read: Any = _of_world if isinstance(loop, OneWorld) else _of_film
         moment, poses, seen = read(loop)
@@ -83,7 +82,7 @@ class Recorder:
             self._columns.setdefault(name, []).append(value)
 
     def after(self, loop: OneWorld | OpenLoop, frame: Keyframe | SceneKeyframe) -> None:
-        """Take down what the keyframe fired, and what there is before the next."""
+        """Record the fired cells of the keyframe, and the bodies before the next."""
         assert frame.fired is not None
         self._columns["rays"].append(fullness(frame.fired, loop.rig.grid))
         if isinstance(loop, OneWorld) or not loop.over:
@@ -154,18 +153,18 @@ def replayed(config: EpisodeConfig | PlayConfig) -> Replay:
     moving = [body for body in bodies if any(pose != body["poses"][0] for pose in body["poses"])]
     standing = [body | {"pose": body.pop("poses")[0]} for body in bodies if body not in moving]
     story = recorder.story(range(len(bodies)), world.ego_kind.size)
-    story |= {"moving": moving, **_told(recorder.loop, keyframes)}
+    story |= {"moving": moving, **_keyframe_columns(recorder.loop, keyframes)}
     return Replay(row, standing, story, tuple(Outcome.__dataclass_fields__))
 
 
-def _told(loop: OneWorld, keyframes: Sequence[Keyframe]) -> dict[str, Any]:
+def _keyframe_columns(loop: OneWorld, keyframes: Sequence[Keyframe]) -> dict[str, Any]:
     """Return the keyframes as columns, and whom the episode is about."""
     world, about = loop.world, sought(loop.world)
 
     def flags(read: Callable[[Any], bool]) -> str:
         return "".join(str(int(read(frame))) for frame in keyframes)
 
-    # How it stands with each of them: "0" out of the cameras' view, "1" in it, "2" detected.
+    # State of each actor: "0" out of the cameras' view, "1" in it, "2" detected.
     sights = [f.sights if world.meetings else (f,) * len(about) for f in keyframes]
     states = [["2" if one.detected else str(int(one.in_view)) for one in each] for each in sights]
     far = [frame.distance_m for frame in keyframes]
@@ -240,7 +239,7 @@ def _replayed_scene(config: PlayConfig, recorder: Recorder) -> Replay:
 def _found(
     film: Film, keyframes: Sequence[SceneKeyframe], numbers: Sequence[int]
 ) -> dict[str, Any]:
-    """How it stands with the objects `numbers` at every keyframe; `entries` are the place among
+    """Return the states of the objects `numbers` at every keyframe. `entries` are the place among
     them and the keyframe of every first sighting.
     """
     states, entries = [], []

@@ -38,10 +38,9 @@ def packed(story: dict[str, Any]) -> str:
 def known_before(
     belief: Belief, sensor: Frame, rig: Rig, tracked: dict[int, list[Any]]
 ) -> dict[str, Any]:
-    """Return the policy's knowledge: `tracks`, each with its id, place, velocity, and whether it
-    was missed and is drawn from its forecast, in the world, and `camera`, the lines of sight of the
-    camera's boxes. Class and size of every track, as they were last, go into `tracked`, once for
-    all moments.
+    """Return the policy's knowledge in the world frame. `tracks` have id, place, velocity, and a
+    flag for a missed one, drawn from its forecast. `camera` are the lines of sight of the camera's
+    boxes. The last class and size of every track go into `tracked`, once for all moments.
     """
     tracks = belief.tracks
     places = sensor.boxes_to_world(tracks.boxes)

@@ -15,7 +15,7 @@ from care_sim.study.run_config import REFERENCE
 
 ALL_CAMERA = "all-camera"
 RANKINGS = {"tracks": "Tracked objects", "explained": "Explained detections"}
-"""What the columns count by which scenes are ranked, per keyframe."""
+"""Quantities per keyframe of the columns that rank scenes."""
 FEWEST_SCENES = 9
 """Three in each third: a smaller third would speak of one or two scenes, not of crowded ones."""
 DENSE_LESS_SPARSE = "dense minus sparse"
@@ -103,7 +103,7 @@ class SceneThird:
 
 
 Comparison = PolicyPair | SceneThird
-"""What can be measured of a setting at a budget and set beside what the paper says of it."""
+"""Measurements of a setting at a budget that can be compared with the paper."""
 
 
 def reference_pairs(plays: SettingPlays, ratio: Ratio, within: str = "") -> list[PolicyPair]:

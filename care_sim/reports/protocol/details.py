@@ -108,8 +108,8 @@ def _differing(rows: Sequence[Row]) -> str:
 
 
 def earlier_tables(plays: SettingPlays) -> list[Table]:
-    """Count the events of logs without labels: a reference is no truth, so recall is no measure of
-    a policy there, but an event that one policy detects before another is (paper, Sec. 5.5).
+    """Count the events of logs without labels (paper, Sec. 5.5). A reference is no truth, so recall
+    does not measure a policy there, but earlier detection of an event does.
     """
     others = plays.other_than(HISTORY)
     if plays.setting.world != WITHOUT_LABELS or not others:

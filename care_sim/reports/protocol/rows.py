@@ -61,8 +61,8 @@ class SettingPlays(Part):
         return by_floor_seed(self.rows(policy, budget))
 
     def tallies(self, policy: str, budget: float, within: str = "") -> Tallies:
-        """The mean tally over floor seeds of every scene that was played with all of them, of all,
-        of one stratum ("range/below 20 m"), or of one kind of newcomers ("emerging").
+        """Return the mean tally over floor seeds of every scene that has all of them. It covers all
+        events, one stratum ("range/below 20 m"), or one kind of newcomers ("emerging").
         """
         return self.frame.tallies(self.key(policy, budget), within)
 

@@ -53,8 +53,8 @@ _ENTRIES = (
 
 
 def entry_tables(plays: SettingPlays) -> list[Table]:
-    """First-sighting recall by entry, plain and as a share of the full scan's, and CARE less
-    history and less all-camera; none of rows of before there were entries, and without an event.
+    """Return tables of first-sighting recall by entry, plain and as a share of the full scan's, and
+    CARE minus history and all-camera. None for older rows without entries, and without an event.
     """
     lines = _lines(plays, FIRST_SIGHTING, [ENTRY], of_full=bool(plays.full))
     shares = ", in brackets of the full scan's" if plays.full else ""

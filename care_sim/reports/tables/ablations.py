@@ -115,7 +115,7 @@ def _table(study: AblationStudy, ablation: Ablation) -> Table:
 def _levels(
     study: AblationStudy, ablation: Ablation, place: Place | FilmPlace, name: str
 ) -> Iterator[TableRow]:
-    """The levels by one measure, and what is told beside them."""
+    """Return the levels by one measure, with further columns."""
     frame, measure = study.frame, study.measures[name]
     keys = [each.key(place, ablation.policy) for each in ablation.levels]
     yield (ablation.policy, *(level(measure, frame.units(measure, key)) for key in keys))

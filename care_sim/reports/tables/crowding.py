@@ -1,5 +1,5 @@
-"""Where the all-camera reserve collapses as the number of tracked vehicles in the dense street
-grows.
+"""The collapse of the all-camera reserve with the number of tracked vehicles in the dense
+street.
 """
 
 from collections.abc import Sequence
@@ -31,7 +31,7 @@ class Crowd:
         self.budgets = sorted({row["budget"] for row in rows if row["policy"] != FULL})
 
     def key(self, vehicles: int, policy: str, budget: float) -> Key:
-        """Where the rows are found."""
+        """Return the key of the rows."""
         place = Place("dense", budget, (("vehicles", vehicles),))
         return USUAL_VARIANT.key(place, policy)
 

@@ -1,6 +1,4 @@
-"""How detection, braking and clearance hold up as every fault grows, and where the order of
-policies changes.
-"""
+"""Detection, braking and clearance under growing faults, and changes in the order of policies."""
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
@@ -73,10 +71,10 @@ def fault_tables(rows: Sequence[Row]) -> list[Table]:
 
 
 def order(pair: tuple[str, str], fault: Fault, place: Place, study: Frame) -> str:
-    """How two policies stand as the fault grows, bold when that changes.
+    """Return the order of two policies under a growing fault, bold if it changes.
 
-    '>' where the first detects earlier by a difference that counts, '<' where the second does, '='
-    elsewhere. Strengths that were not played are passed over.
+    '>' if the first detects earlier by a difference that counts, '<' if the second does, '='
+    otherwise. Strengths that were not played are skipped.
     """
     found = [(level.label, _difference(pair, level, place, study)) for level in fault.levels]
     # The sign of the first strength that was played, then each strength at which it turns. By the

@@ -1,5 +1,5 @@
-"""The mechanism of first sightings: the shared belief beside the paper (Secs. 5.2 and 5.5), then
-which policy detected first on its own play, by whose rays, and why others missed.
+"""The mechanism of first sightings: the shared belief beside the paper (Secs. 5.2 and 5.5). Then
+which policy detected first on its own play, by which rays, and why others missed.
 """
 
 from collections import Counter
@@ -22,7 +22,7 @@ from care_sim.study.run_config import FULL, REFERENCE, Row
 
 # The paper's figures stand beside the quantities below; these two are of several.
 _CHANGED = {"all-camera": "17% at 10%, 68% at 35%"}
-"""Of the keyframes, by the policy that is compared with CARE."""
+"""Shares of keyframes, by the policy that is compared with CARE."""
 CELLS_AT_APPEARANCE = ("1 to 5", "117 to 123")
 """On the vehicle, without a camera: outside, and inside established coverage."""
 _MECHANICAL = (
@@ -156,7 +156,9 @@ def _belief(plays: _Plays) -> Table:
 
 
 def _allocations(plays: _Plays) -> Table:
-    """How the policies differ from the driver on its belief, and what they give to new objects."""
+    """Return tables of the policies' differences from the driver on its belief, and of their cells
+    for new objects.
+    """
     lines: list[TableRow] = []
     for policy in plays.tags:
         pairs = [*plays.pairs(policy, plays.driver)]
@@ -185,7 +187,7 @@ def _allocations(plays: _Plays) -> Table:
 
 
 def _order(plays: _Plays) -> Table:
-    """Which policy detected the events first, each on its own play."""
+    """Return a table of which policy detected the events first, each on its own play."""
     lines: list[TableRow] = []
     for pair in combinations(plays.tags, 2):
         delays = ((a["ttfds"], b["ttfds"]) for a, b in plays.pairs(*pair))
@@ -204,8 +206,8 @@ def _order(plays: _Plays) -> Table:
 
 
 def _credit(plays: _Plays) -> Table:
-    """Which share fired the rays of the first sightings that one policy caught and another
-    missed.
+    """Return a table of the shares that fired the rays of first sightings that one policy detected
+    and another missed.
     """
     lines: list[TableRow] = []
     for pair in permutations(plays.tags, 2):
@@ -230,7 +232,7 @@ def _credit(plays: _Plays) -> Table:
 
 
 def _misses(plays: _Plays) -> Table:
-    """Why policies missed first sightings that the full scan finds at once."""
+    """Return a table of reasons for missed first sightings that the full scan detects at once."""
     lines: list[TableRow] = []
     for policy in plays.tags:
         found = [

@@ -1,4 +1,4 @@
-"""The Euro NCAP tests: how they ended, by test and in all, and which policy scores more."""
+"""The Euro NCAP tests: outcomes by test and in all, and differences in scores."""
 
 import math
 from collections import Counter

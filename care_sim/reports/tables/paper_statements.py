@@ -42,7 +42,7 @@ class Statement(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """Whether they agree, in a word."""
+        """Whether statement and measurement agree, in a word."""
         return "agrees" if self.agrees else "DIFFERS"
 
 

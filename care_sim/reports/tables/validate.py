@@ -1,5 +1,5 @@
-"""The validation of a world: whether it discriminates between policies, what that rests on, and
-every policy in every world.
+"""The validation of a world: whether it discriminates between policies, the evidence, and every
+policy in every world.
 """
 
 from collections.abc import Sequence

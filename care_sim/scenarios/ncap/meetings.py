@@ -1,7 +1,8 @@
-"""How the ego and its target come to meet, on straight ways and in turns, and when a test is over.
+"""Meetings of the ego and its target, on straight ways and in turns, and the end of a test.
 
-A test ends as the protocol's does: with a contact, when the ego stands before the target's way or
-the target has left the ego's, or when the ego is no faster than the target that it follows.
+A test ends as the protocol's does, in one of four cases. There is a contact, the ego stands before
+the target's way, the target has left the ego's, or the ego is no faster than the target that it
+follows.
 
 An ego that does not brake goes along x and has its front at the target at `hit_s`. Right-hand
 traffic. In a turn the ego's first lane is along x with its middle at y = 0, at a junction of two
@@ -35,7 +36,7 @@ from care_sim.world.route import Leg, Route
 from care_sim.world.world import Motion, World
 
 CLEAR_M = 0.2
-"""So far apart nothing touches: far more than the centimetres by which hulls are padded."""
+"""Distance without contact: far more than the centimetres by which hulls are padded."""
 
 
 @dataclass(frozen=True)
@@ -48,18 +49,18 @@ class Ego:
     hit_s: float
 
     def share(self, overlap: float) -> float:
-        """How far the place at a share of the width lies from the middle, in the direction in which
-        the share grows.
+        """Return the distance from the middle of a place at a share of the width, in the direction
+        of growing share.
         """
         return self.width * (overlap - 0.5)
 
 
 @dataclass(frozen=True)
 class Crossing:
-    """The ways of both cross.
+    """Crossing ways.
 
-    The ego's front is on the target's way from where its centre has gone `enter_m`, its rear off it
-    at `leave_m`. The target has left the ego's way at `clear_s`.
+    The ego's front enters the target's way when its centre has gone `enter_m`, and its rear leaves
+    it at `leave_m`. The target has left the ego's way at `clear_s`.
     """
 
     enter_m: float
@@ -86,8 +87,8 @@ class Following:
 
 @dataclass(frozen=True)
 class Meeting:
-    """The target's motion, and when the test is over; the middle line x of the way of a target that
-    crosses, which obstructions stand by; the ego's route where it turns.
+    """The target's motion and the end of the test. Also the middle line x of a crossing target's
+    way, which obstructions follow, and the ego's route in a turn.
     """
 
     motion: Motion
@@ -97,7 +98,9 @@ class Meeting:
 
 
 def across(way: Across, target: Target, speed: float, ego: Ego) -> Meeting:
-    """A target that comes from the right at `speed` m/s, from the left if far."""
+    """Return the meeting with a target that comes from the right at `speed` m/s, from the left if
+    far.
+    """
     length, width, _ = CATALOGUE[target.body].size
     # The ego's front comes to the side of the target, whose middle line is half its width beyond.
     hit_x = ego.length / 2 + ego.speed * ego.hit_s
@@ -120,7 +123,7 @@ def across(way: Across, target: Target, speed: float, ego: Ego) -> Meeting:
 
 
 def ahead(way: Ahead, target: Target, speed: float, ego: Ego) -> Meeting:
-    """A target that goes the ego's way at `speed` m/s, or stands."""
+    """Return the meeting with a target ahead on the ego's way, at `speed` m/s or standing."""
     hit_x = ego.length / 2 + ego.speed * ego.hit_s
     x = hit_x + CATALOGUE[target.body].size[0] / 2
     y = ego.share(way.overlap)
@@ -134,7 +137,7 @@ def ahead(way: Ahead, target: Target, speed: float, ego: Ego) -> Meeting:
 
 
 def braking_ahead(way: BrakingAhead, target: Target, ego: Ego) -> Meeting:
-    """A car that drives ahead at the ego's speed and brakes."""
+    """Return the meeting with a car that drives ahead at the ego's speed and brakes."""
     start_x = (ego.length + CATALOGUE[target.body].size[0]) / 2 + way.headway_s * ego.speed
     final = way.final_kph / 3.6
     return Meeting(partial(_braking, way, start_x, ego.speed, final), Following(final))
@@ -160,7 +163,7 @@ _SLACKEST_M = 1500.0
 _ARCS = 16
 """Arcs that stand for a clothoid."""
 _BEYOND_M = 50.0
-"""So far behind the bend a car has come to any line that is asked for."""
+"""Distance behind the bend at which a car has passed any requested line."""
 
 
 def bend_route(bend: Bend, right: bool, before_m: float) -> Route:
@@ -179,7 +182,9 @@ def bend_route(bend: Bend, right: bool, before_m: float) -> Route:
 
 
 def across_exit(way: AcrossExit, target: Target, speed: float, bend: Bend, ego: Ego) -> Meeting:
-    """A pedestrian who crosses the road that the ego turns into at `speed` m/s."""
+    """Return the meeting with a pedestrian who crosses the road that the ego turns into at `speed`
+    m/s.
+    """
     length, width, _ = CATALOGUE[target.body].size
     side = -1.0 if way.right else 1.0
     line_y = LANE_WIDTH_M / 2 + side * way.offset_m
@@ -202,7 +207,7 @@ def across_exit(way: AcrossExit, target: Target, speed: float, bend: Bend, ego: 
 
 
 def oncoming(target: Target, speed: float, bend: Bend, ego: Ego) -> Meeting:
-    """A car that comes towards the ego, which turns left before it, at `speed` m/s."""
+    """Return the meeting with an oncoming car at `speed` m/s, before which the ego turns left."""
     length, width, _ = CATALOGUE[target.body].size
     # The ego's front has come to the target's side: half its width before the middle of its lane,
     # seen at 45 degrees.

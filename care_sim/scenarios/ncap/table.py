@@ -1,11 +1,11 @@
-"""Euro NCAP tests, number by number: who is met, on which way, and behind what.
+"""The numbers of the Euro NCAP tests: targets, ways, and obstructions.
 
-Pedestrians and bicyclists are those of the AEB/LSS VRU protocol v4.5.1 (implementation 2023), which
-gives the tests their names and has the turning ones; the car tests are those of the Crash Avoidance
-Frontal Collisions protocol v1.1 (implementation 2026), which has the crossing car. Every number is
-that of the public OpenSCENARIO files of both (Vector Informatik, vectorgrp/OSC-NCAP-scenarios),
-and `tests/scenarios/test_ncap_files.py` holds them to those files. Where the two years differ, the
-2023 one counts for pedestrians and bicyclists: it runs in steps of 5 km/h, the other of 10.
+Pedestrian and bicyclist tests are those of the AEB/LSS VRU protocol v4.5.1 (implementation 2023),
+which names the tests and has the turning ones. Car tests are those of the Crash Avoidance Frontal
+Collisions protocol v1.1 (implementation 2026), which has the crossing car. All numbers are from the
+public OpenSCENARIO files of both (Vector Informatik, vectorgrp/OSC-NCAP-scenarios);
+`tests/scenarios/test_ncap_files.py` compares them. Where the two years differ, pedestrians and
+bicyclists follow 2023, which has steps of 5 km/h instead of 10.
 
 Right-hand traffic: the near side is the ego's right. Metres, seconds, km/h where the protocols
 speak of speeds.
@@ -17,10 +17,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Target:
-    """Whom the ego meets.
+    """The target that the ego meets.
 
-    `body` is a kind of the catalogue. `point_m` is how far behind its centre, seen along its way,
-    the point lies that the ego's front is to meet.
+    `body` is a kind of the catalogue. `point_m` is the distance of the impact point behind its
+    centre, along its way.
     """
 
     body: str
@@ -31,11 +31,10 @@ class Target:
 class Across:
     """A straight way at right angles to the ego's.
 
-    The target stands with its centre `start_m` from the middle of the ego's way, gains its speed
-    over the first `run_up_m` and keeps it; without a run-up it has its speed from the beginning.
-    Its point is in line with the share `overlap` of the ego's width when the ego's front comes to
-    its side. The share is counted from the side that the target comes from, which is the left one
-    where it is the `far` side.
+    The target starts with its centre `start_m` from the middle of the ego's way. It gains its speed
+    over the first `run_up_m`, or has it from the beginning, and keeps it. When the ego's front
+    reaches the target's side, the impact point is at the share `overlap` of the ego's width. The
+    share is counted from the target's side, which is the left for `far`.
     """
 
     start_m: float
@@ -72,8 +71,8 @@ class BrakingAhead:
 
 @dataclass(frozen=True)
 class Bend:
-    """The ego's way through a junction of two-lane roads, a quarter turn: a clothoid from a radius
-    of 1,500 m down to `radius_m` that turns by `clothoid_deg`, an arc of `arc_deg`, and the
+    """The ego's way through a junction of two-lane roads, a quarter turn. It has a clothoid from a
+    radius of 1,500 m down to `radius_m` that turns by `clothoid_deg`, an arc of `arc_deg`, and the
     clothoid back.
     """
 
@@ -102,9 +101,9 @@ class AcrossExit:
 
 @dataclass(frozen=True)
 class Oncoming:
-    """The ego turns left. The target comes towards it in the lane beside, and its front is where
-    the ego's way crosses the middle of that lane as the ego's front comes up to its side. The ego
-    has a bend for each of its speeds in km/h.
+    """The ego turns left. The target is oncoming in the next lane. When the ego's front reaches the
+    target's side, the target's front is where the ego's way crosses the middle of that lane. The
+    ego has a bend for each of its speeds in km/h.
     """
 
     bends: Mapping[float, Bend]
@@ -115,9 +114,9 @@ Way = Across | Ahead | BrakingAhead | AcrossExit | Oncoming
 
 @dataclass(frozen=True)
 class ParkedAlong:
-    """Two cars parked beside the ego's way, the small one before the large one: `beside_m` from the
-    ego's side to the large one's, `gap_m` between the two, and from the small one to the target's
-    side.
+    """Two cars parked beside the ego's way, the small one before the large one. `beside_m` is from
+    the ego's side to the large one's. `gap_m` is between the two, and from the small one to the
+    target's side.
     """
 
     beside_m: float
@@ -126,8 +125,8 @@ class ParkedAlong:
 
 @dataclass(frozen=True)
 class StandingAcross:
-    """Two cars that stand in line along the target's way, `before_m` before its side, seen from the
-    ego: the large one `end_m` from the middle of the ego's way, the small one `gap_m` behind it.
+    """Two cars in line along the target's way, `before_m` before its side, seen from the ego. The
+    large one is `end_m` from the middle of the ego's way, the small one `gap_m` behind it.
     """
 
     end_m: float
@@ -137,9 +136,9 @@ class StandingAcross:
 
 @dataclass(frozen=True)
 class WaitingBeside:
-    """A large and two small cars that stand in line along the ego's way, on the target's side,
-    `gap_m` between them: the first one's bumper `before_m` before the middle of the target's way,
-    their sides `beside_m` from the middle of the ego's.
+    """A large and two small cars in line along the ego's way, on the target's side, `gap_m` between
+    them. The first one's bumper is `before_m` before the middle of the target's way. Their sides
+    are `beside_m` from the middle of the ego's way.
     """
 
     before_m: float
@@ -160,7 +159,7 @@ class Variation:
 
 @dataclass(frozen=True)
 class NcapTest:
-    """A test: whom the ego meets, on which way, behind what, and at which speeds.
+    """A test: target, way, obstruction and speeds.
 
     The episode begins `start_s` before an ego that does not brake hits the target.
     """

@@ -1,7 +1,5 @@
-"""Engines: who answers which body a ray hits, how far away, and which body a pixel shows.
-
-`bullet` is the reference. `fast` is compiled and gives the same answers within the differences that
-`make parity` measures.
+"""Engines find the body that a ray hits, its distance, and the body that a pixel shows. `bullet` is
+the reference. `fast` is compiled and agrees within the differences that `make parity` measures.
 """
 
 import inspect
@@ -30,21 +28,19 @@ class Engine(Protocol):
     """Casts the rays of one grid at the bodies of one world, and draws these for cameras."""
 
     def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
-        """Fire `cells` (n,) from the frame `sensor`.
-
-        Returns ranges (n,) in metres, inf without a hit within the grid's reach, and body ids (n,),
-        NO_BODY where there is no hit.
+        """Fire `cells` (n,) from the frame `sensor`. Returns ranges (n,) in metres, inf without a
+        hit within the grid's reach, and body ids (n,), NO_BODY without a hit.
         """
 
     def body_ids(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
-        """The id of the body that each pixel of a window of `camera` shows, NO_BODY where there is
-        none; see `care_sim.world.bullet.BulletWorld.body_ids`.
+        """Return the body id of each pixel in a window of `camera`, NO_BODY without a body. See
+        `care_sim.world.bullet.BulletWorld.body_ids`.
         """
 
     def visible_boxes(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
-        """(n, 6) the bodies in a window of `camera` in ascending order: id; left, top, right,
-        bottom of the box that holds all its pixels, counted from the corner of the picture; their
-        number.
+        """Return (n, 6) the bodies in a window of `camera`, ascending by id. Columns: id, box
+        (left, top, right, bottom), number of pixels. The box holds all pixels of the body, counted
+        from the corner of the picture.
         """
 
 
@@ -88,8 +84,8 @@ class Fast:
 
     def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
         """Ranges and body ids; see `Engine`."""
-        # The kernel finds the cells of a window by bisection, so it needs them ascending. Most who
-        # ask have them so; for others they are sorted, and the answers put back in their order.
+        # The kernel finds the cells of a window by bisection, so it needs them ascending. Unsorted
+        # cells are sorted, and the answers put back in their order.
         if (cells[1:] < cells[:-1]).any():
             order = np.argsort(cells)
             ranges, ids = self.cast(sensor, cells[order])
@@ -112,7 +108,7 @@ class Fast:
         return bodies_in_view(self._view(camera, sensor, window))
 
     def _view(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> View:
-        """What the kernels of pictures ask for."""
+        """Return the inputs of the picture kernels."""
         world = self._world
         lens = camera.focal, camera.width / 2, camera.height / 2
         depths = NEAR_M, FAR_M
@@ -138,8 +134,8 @@ class Fast:
 
 
 class HeadEngines:
-    """An engine of one kind, which `make` makes, for each LiDAR of a stack. The cameras are told in
-    the frame of the first, so that its engine draws their pictures.
+    """One engine per LiDAR of a stack, all made by `make`. Cameras are in the frame of the first
+    LiDAR, so its engine draws their pictures.
     """
 
     def __init__(

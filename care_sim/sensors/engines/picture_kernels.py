@@ -55,8 +55,8 @@ def boxes_of_window(ids: Integers, window: PixelWindow) -> Integers:
 
 @compiled()
 def note_pixels(found: Integers, body: int, row: int, first: int, end: int, pixels: int) -> None:
-    """Take into the table `found`, which has a row for every possible id, zeros at first, that a
-    body has so many `pixels` from the column `first` to the one before `end`. Rows come in order.
+    """Add a body's `pixels`, from column `first` to the one before `end`, to the table `found`.
+    `found` has a row for every possible id, zeros at first. Call it in the order of picture rows.
     """
     if found[body, 5] == 0:
         found[body, 0], found[body, 1], found[body, 2] = body, first, row
@@ -102,9 +102,9 @@ View = tuple[
     Tables,
     Floats,
 ]
-"""The fields of `PlacedCamera` and of `Lens`; the window of the picture that is drawn: left, top,
-right, bottom; the least and the greatest depth drawn, metres; the fields of `Meshes`; the poses
-(m, 7) of bodies by id.
+"""Inputs of a picture: the fields of `PlacedCamera` and of `Lens`. Then the drawn window (left,
+top, right, bottom), the least and the greatest depth in metres, the fields of `Meshes`, and the
+poses (m, 7) of bodies by id.
 """
 
 
@@ -258,8 +258,8 @@ def _read_row(
     ids: Integers,
     found: Integers,
 ) -> None:
-    """Take what the line `ids` shows in a row of the window, which begins at the row `top` of the
-    picture, into a table of boxes; the rest as in `Silhouettes`.
+    """Add the line `ids` of a window's row to a table of boxes. The window begins at the row `top`
+    of the picture. Other arguments are as in `Silhouettes`.
     """
     n = 0
     while n < count:

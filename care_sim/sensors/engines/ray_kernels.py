@@ -32,8 +32,8 @@ class Fan(NamedTuple):
 
 
 class RoadPlane(NamedTuple):
-    """The plane z = 0 of the world: the world's `up` (3,) in the frame of the sensor, the `height`
-    of the sensor in metres, and the `body` id of the ground, NO_BODY without one.
+    """The plane z = 0 of the world. `up` (3,) is the world's up in the sensor frame, `height` the
+    sensor's height in metres. `body` is the id of the ground, NO_BODY without ground.
     """
 
     up: Floats

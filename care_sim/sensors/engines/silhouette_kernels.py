@@ -1,10 +1,12 @@
-"""What a camera sees of convex polyhedra, compiled: where each lies in the picture, row by row.
+"""Silhouettes of convex polyhedra in a picture, row by row, compiled.
 
-A ray through pixel (u, v), one metre long along the optical axis, meets the plane n . x = h of the
-camera's frame at the inverse depth (n . ray) / h, which is linear in u and v. What is seen of a
-polyhedron lies at the least of these among its faces towards the camera; its outline is where a
-face towards the camera meets one that is turned away. PyBullet's renderer samples column i at u = i
-and row j at v = j + 1, outlines included, and so does this.
+Take a ray through pixel (u, v), one metre long along the optical axis. It meets the plane n . x = h
+of the camera's frame at the inverse depth (n . ray) / h, which is linear in u and v. The visible
+surface of a polyhedron has the least inverse depth of its faces towards the camera. Its outline is
+where a face towards the camera meets one that is turned away.
+
+PyBullet's renderer samples column i at u = i and row j at v = j + 1, outlines included, and so does
+this.
 """
 
 import math
@@ -30,23 +32,25 @@ from care_sim.world.bullet import PixelWindow
 LOT = 8
 """Columns that are worked on together, as many as compiled code takes at once or a multiple."""
 Outline = tuple[Floats, Floats, Floats]
-"""Of rows: where each is in the picture, and the first and the last column inside, not rounded."""
+"""Rows of an outline: the place of each in the picture, and its first and last column inside, not
+rounded.
+"""
 
 
 class Silhouettes(NamedTuple):
-    """Room for what a window of a picture shows of polyhedra.
+    """Buffers for the polyhedra that a window of a picture shows.
 
-    Those that are in it have places, in the order of the meshes: `owners` (k,) their bodies,
-    `facing` (f, 3) the inverse depths of their faces that are turned towards the camera, per
-    column, per row, and at pixel (0, 0). Those of a place begin at `starts` (k + 1,): in threes,
-    the last one repeated.
+    Visible polyhedra have places, in the order of the meshes. `owners` (k,) are their bodies.
+    `facing` (f, 3) are the inverse depths of their faces towards the camera: per column, per row,
+    and at pixel (0, 0). The faces of a place begin at `starts` (k + 1,), in threes, the last one
+    repeated.
 
-    Row by row of the window, `counts` (height,) of them are crossed: `crossed` (height, k) tells
-    which, `stretches` (height, k, 2) the first column of each and the one after its last.
+    Row r of the window crosses `counts[r]` polyhedra. `crossed` (height, k) are their places.
+    `stretches` (height, k, 2) are the first column of each and the one after its last.
 
-    For the work on one polyhedron: `planes` (f, 4) as `_lay_planes` and `lines` (e, 3) as
-    `_lay_lines` have them, and an `outline`.
-    `numbers` are 0.0, 1.0, 2.0, for every column and a lot more of them.
+    Work on one polyhedron uses `planes` (f, 4) as in `_lay_planes`, `lines` (e, 3) as in
+    `_lay_lines`, and an `outline`. `numbers` are 0.0, 1.0, 2.0, for every column and a lot more of
+    them.
     """
 
     owners: Integers
@@ -188,11 +192,10 @@ def _begin_outline(upper: int, rows: int, left: int, right: int, outline: Outlin
 
 @compiled()
 def _lay_lines(edges: Integers, begin: int, end: int, planes: Floats, lines: Floats) -> int:
-    """Fill `lines` (m, 3) with the outline of a polyhedron with the `planes` (f, 4), whose edges
-    are those from `begin` to the one before `end`; return how many lines it has.
-
-    They are told per column, per row, and at pixel (0, 0), by a number that is positive inside, 0
-    on the line and negative outside.
+    """Fill `lines` (m, 3) with the outline of a polyhedron and return their number. `planes` (f, 4)
+    are its faces; its edges are those from `begin` to the one before `end`. A line holds numbers
+    per column, per row, and at pixel (0, 0). Their sum at a pixel is positive inside, 0 on the line
+    and negative outside.
     """
     # An edge is on the outline where one of its two faces is turned towards the camera (distance
     # below 0) and the other is not. Along the edge both have one inverse depth, so that their

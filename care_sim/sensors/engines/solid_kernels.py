@@ -208,7 +208,7 @@ def _surface(shape: int, half: Floats, place: Vector, ray: Vector) -> Surface:
 
 @compiled()
 def _face(place: float, half: float, ray: float) -> Surface:
-    """The nearer of the two planes at -half and half, of which all is told across them."""
+    """Return the nearer of the two planes at -half and half, by the coordinate across them."""
     return abs(place) - half, -ray if place > 0.0 else ray
 
 

@@ -30,12 +30,12 @@ class Lens(NamedTuple):
 
 
 class Meshes(NamedTuple):
-    """The polyhedra of parts one after the other, in the frames of their bodies, as in
-    `care_sim.world.body_tables.Polyhedra.tables`: `corners` (c, 3); `faces` (f, 4), outward normals
-    and distances from the body's origin; `edges` (e, 2), the two faces that meet in each, counted
-    within the part; `starts` (k + 1, 3), where the rows of a part begin in these three; `owners`
-    (k,) body ids, the parts of a body side by side; `reaches` (k,) how far each part reaches from
-    the body's origin.
+    """The polyhedra of parts, concatenated, in the frames of their bodies
+    (`care_sim.world.body_tables.Polyhedra.tables`). `corners` (c, 3). `faces` (f, 4) are outward
+    normals and distances from the body's origin. `edges` (e, 2) are the two faces that meet in each
+    edge, counted within the part. `starts` (k + 1, 3) are the first rows of each part in these
+    three tables. `owners` (k,) are body ids, with the parts of a body side by side. `reaches` (k,)
+    are how far each part reaches from the body's origin.
     """
 
     corners: Floats
@@ -62,8 +62,8 @@ def is_outside(
     lens: Lens,
     view: tuple[float, float, int, int],
 ) -> bool:
-    """Whether a ball of radius `reach` about the position of a body lies wholly outside of a view:
-    nearer or farther than its first two numbers, or beside the columns of the other two.
+    """Return True if a ball of radius `reach` about a body lies wholly outside a view. The view's
+    first two numbers are its least and greatest depth, the other two its columns.
     """
     nearest, farthest, first, last = view
     place = camera.place
@@ -82,7 +82,7 @@ def is_outside(
 
 @compiled()
 def body_in_camera(camera: PlacedCamera, poses: Floats, number: int) -> BodyInCamera:
-    """A body as the camera sees it."""
+    """Return a body's pose in the camera's frame."""
     body = body_axes(poses[number, 3], poses[number, 4], poses[number, 5], poses[number, 6])
     away = _away(poses, number, camera.place)
     # A point p of the body lies at position + body . p in the world. Told along the axes of the
@@ -114,8 +114,9 @@ def row_of(table: Floats, n: int) -> Vector:
 def rectangle_of(
     corners: Floats, begin: int, end: int, body: BodyInCamera, lens: Lens, nearest: float
 ) -> PixelWindow:
-    """The columns and rows of a polyhedron in the picture, as a window that ends before its right
-    and bottom; the whole picture when it reaches through the plane at the depth `nearest`.
+    """Return the columns and rows of a polyhedron in the picture, as a window that excludes its
+    right and bottom. Returns the whole picture if the polyhedron crosses the plane at the depth
+    `nearest`.
     """
     # The picture of a convex body before the camera is bounded by those of its corners.
     turn = body.turn

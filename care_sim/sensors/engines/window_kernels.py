@@ -1,7 +1,7 @@
-"""Where the parts of bodies are around a sensor, and which cells each can cover, compiled.
+"""Parts of bodies around a sensor, and the cells that each can cover, compiled.
 
-A ray is asked only about the parts whose window holds its cell. A window may hold too many cells,
-but never too few: a ray that meets nothing in a window is merely tried in vain.
+Rays are tested only against parts whose window holds their cell. A window may hold too many cells,
+but never too few: extra cells cost time and change nothing.
 """
 
 import math
@@ -17,7 +17,7 @@ from care_sim.sensors.engines.geometry_kernels import Axes, Vector, body_axes, d
 WINDOW_MARGIN = 0.001
 """Cells around a window, against rounding."""
 NEAREST_MARGIN_M = 0.001
-"""What the nearest point of a part may be nearer, against rounding."""
+"""Margin of the nearest point of a part against rounding, metres."""
 NO_CELLS = (0, 0, 0, -1)
 """The window of a part that covers none."""
 
@@ -34,9 +34,9 @@ class SensorPose(NamedTuple):
 
 
 class Parts(NamedTuple):
-    """The parts of the bodies that rays can hit, as in `care_sim.world.body_tables`: `shapes` (k,)
-    places in SHAPES; half extents `halves` (k, 3) and centres `offsets` (k, 3) in the frame of the
-    body, metres; `owners` (k,) body ids.
+    """The parts of bodies that rays can hit (`care_sim.world.body_tables`). `shapes` (k,) index
+    SHAPES. Half extents `halves` (k, 3) and centres `offsets` (k, 3) are metres in the frame of the
+    body. `owners` (k,) are body ids.
     """
 
     shapes: Integers
@@ -46,14 +46,11 @@ class Parts(NamedTuple):
 
 
 class PlacedParts(NamedTuple):
-    """Parts in the frame of a sensor: `centres` (k, 3) in metres; `axes` (k, 3, 3), row i the
-    part's axis i; `windows` (k, 4), the first and last column and the first and last row of the
-    angular rectangle of the box that holds each part; and `nearest` (k,), no more than how far any
-    of its points is.
-
-    The first column lies within a turn, the last up to a turn beyond it. The first row lies below
-    the last where a part covers none; of such a part nothing else need be told. `up` (3,) is the
-    world's up.
+    """Parts in the frame of a sensor. `centres` (k, 3) are metres; row i of `axes` (k, 3, 3) is the
+    part's axis i. `windows` (k, 4) bound the box of each part: first and last column, first and
+    last row. The first column lies within a turn, the last up to a turn beyond it. A part that
+    covers no cell has its first row below the last; its other numbers are undefined. `nearest` (k,)
+    is at most the distance of the part's nearest point. `up` (3,) is the world's up.
     """
 
     centres: Floats

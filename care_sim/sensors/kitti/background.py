@@ -89,7 +89,7 @@ def _place_scene(shown: Picture, kind: int, keys: tuple[np.uint64, np.uint64], a
             score = score_at(numbers.scene_scores[kind], drawn[4], numbers)
             add_box(into, at, CLASS_OF[kind], score)
             # The errors that last are in the mixture already.
-            let_err(box, kind, score, (keys[1], 1 - numbers.edges_share), picture, numbers)
+            add_errors(box, kind, score, (keys[1], 1 - numbers.edges_share), picture, numbers)
             return True
     return False
 
@@ -133,13 +133,13 @@ def add_lent(
         score = score_at(numbers.scene_scores[kind], normal(own, 0), numbers)
         add_box(into, count, lent[0][n], score)
         copy_box(lent[1][n], into.edges[count])
-        let_err(into.edges[count], kind, score, (own, 1.0), shown.frame, numbers)
+        add_errors(into.edges[count], kind, score, (own, 1.0), shown.frame, numbers)
         count += 1
     return count
 
 
 @compiled()
-def let_err(
+def add_errors(
     box: Floats,
     kind: int,
     score: float,

@@ -35,8 +35,8 @@ EDGES = 4
 
 
 class Draws(NamedTuple):
-    """What a keyframe has drawn: (objects,) luck as normal numbers, (objects, 4) errors of edges,
-    a key of its own, and the chance of false boxes.
+    """Draws of a keyframe: (objects,) luck as normal numbers, (objects, 4) errors of edges, a key,
+    and the chance of false boxes.
     """
 
     luck: Floats
@@ -88,11 +88,10 @@ class KittiDetector:
     def detect(
         self, seen: IdentifiedDetections, boxes: Floats, lent: Floats, time_s: float
     ) -> tuple[Floats, Integers, Floats]:
-        """What is reported of the faultless detections `seen` (m,): rows (k, 9) as
-        `ImageDetections.rows`, (k,) the object behind each, and rows (j, 9) of false boxes.
-
-        `boxes` (n, 7) are the 3D boxes of all objects in the sensor frame, `lent` (l, 9) further
-        false boxes: they get scores and errors as the others. Errors go by keyframes, whatever the
+        """Return the reports on the faultless detections `seen` (m,). Returns rows (k, 9) as
+        `ImageDetections.rows`, (k,) the object behind each, and rows (j, 9) of false boxes. `boxes`
+        (n, 7) are the 3D boxes of all objects in the sensor frame. `lent` (l, 9) are further false
+        boxes, which get scores and errors like the others. Errors change per keyframe, whatever the
         time.
         """
         # Everything is drawn at every keyframe, whatever is there.

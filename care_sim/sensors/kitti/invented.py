@@ -1,8 +1,8 @@
-"""What both kinds of false boxes are drawn with: mixtures of normal distributions with independent
-columns, and where on the road a box of a size ends.
+"""Tools that draw both kinds of false boxes: mixtures of normal distributions with independent
+columns, and where on the road a box ends.
 
-The lower edge of a false box is counted from where a box of its size would end that stands on the
-road as objects do: real false boxes follow the road.
+The lower edge of a false box is relative to a box of its size that stands on the road as objects
+do, because real false boxes follow the road.
 """
 
 import math
@@ -28,8 +28,8 @@ TOUCHING = 0.1
 
 
 class Chance(NamedTuple):
-    """What false boxes are drawn from: a `key`, a key of the keyframe (`now`), and the keyframe
-    since which each lasts.
+    """Random sources of false boxes: a `key`, a key of the keyframe (`now`), and the first keyframe
+    of each lasting box.
     """
 
     key: np.uint64
@@ -50,7 +50,7 @@ class Boxes(NamedTuple):
 
 
 class Picture(NamedTuple):
-    """What a picture shows, and where its boxes are entered."""
+    """A picture: the objects in it, and the buffers for its boxes."""
 
     labels: Labels
     own: Integers

@@ -1,8 +1,9 @@
-"""What the detector's formulas use of each object in a picture, in pixels of KITTI's focal length.
+"""Inputs of the detector's formulas for each object in a picture, in pixels of KITTI's focal
+length.
 
-KITTI's labels are boxes of whole objects, hidden parts included: on labels of all levels of
-occlusion the width is that of the projected 3D box (cars 1.00, cyclists 1.02, in the median) and so
-is the height (0.99). So here an object's box is its projected 3D box, cut at the picture's edges.
+KITTI's labels are boxes of whole objects, hidden parts included. On labels of all levels of
+occlusion the median width is that of the projected 3D box (cars 1.00, cyclists 1.02). So is the
+height (0.99). So here an object's box is its projected 3D box, cut at the picture's edges.
 Pedestrians and two-wheelers fill a share of its width (`UNHIDDEN`): the sides move inwards by that.
 """
 
@@ -61,10 +62,9 @@ class Labels(NamedTuple):
 
 
 def pictures_of(cameras: Sequence[PinholeCamera], focal_px: float) -> Floats:
-    """(k, 5) width, height, middle column and row of the horizon of the cameras' pictures, in
-    pixels of the focal length `focal_px`, and how many times as high as KITTI's each camera is.
-
-    The LiDAR is taken to be LIDAR_HEIGHT_M above the road, and cameras not to roll.
+    """Return (k, 5) width, height, middle column and horizon row of the cameras' pictures, and the
+    camera's height over KITTI's. Lengths are in pixels of the focal length `focal_px`. Assumes the
+    LiDAR LIDAR_HEIGHT_M above the road and no roll of cameras.
     """
     rows = [
         (each.width, each.height, each.width / 2, each.height / 2 + each.focal * np.tan(each.pitch))

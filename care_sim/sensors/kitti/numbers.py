@@ -26,7 +26,7 @@ FEATURES = (
     *("occ1", "occ2", "occ3", "trunc", "trunc^2", "occ1*log(h/40)", "occ2*log(h/40)"),
     *("shape", "shape^2", "occ1*shape", "occ2*shape", "metres", "metres^2", "cover", "cover^2"),
 )
-"""What recall depends on, in the order of `Numbers.recall` (`care_sim.sensors.kitti.recall`)."""
+"""Inputs of recall, in the order of `Numbers.recall` (`care_sim.sensors.kitti.recall`)."""
 
 FARTHEST = 6.0
 """Normal scores beyond this, one in 500 million, count as this."""
@@ -85,7 +85,7 @@ class Numbers(NamedTuple):
     edges_share: float
     """Share of the variance of its errors that stays as long."""
     suppression_iou: float
-    """Of two boxes of a class that overlap more only one is reported."""
+    """Overlap above which only one of two boxes of a class is reported."""
 
 
 class Times(NamedTuple):
@@ -104,7 +104,7 @@ class Times(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """What `measured.json` holds."""
+    """The content of `measured.json`."""
 
     numbers: Numbers
     times: Times

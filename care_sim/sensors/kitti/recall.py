@@ -1,9 +1,9 @@
-"""Whom the detector finds, and how sure it is.
+"""Recall and scores of the detector.
 
-The chance that an object has a score of at least t is a logistic formula of its height in pixels,
-its occlusion, how much of it is beyond the picture, its shape, its distance at that height, and how
-much of its box nearer boxes cover. It is fitted at nine scores t; between them the logit is linear
-in that of t. One number of luck decides both: the score is the highest t whose chance exceeds it.
+The chance that an object has a score of at least t is a logistic formula. It uses height in pixels,
+occlusion, the share beyond the picture, shape, distance at that height, and the share that nearer
+boxes cover. It is fitted at nine scores t; between them the logit is linear in that of t. One
+number of luck decides both: the score is the highest t whose chance exceeds it.
 """
 
 import math
@@ -39,13 +39,13 @@ def recall(
 ) -> Floats:
     """Return the chance that the detector finds objects with at least this `confidence`.
 
-    `label` is one of the five classes. Arrays of one shape, or numbers: heights and widths of the
-    whole box in pixels of KITTI's focal length (721.5), cut at the picture's edges; KITTI's level
-    of `occlusion`, 0 to 3; the share of the box beyond the picture (`truncation`); planar distance
-    in metres; the share of the box that nearer boxes `cover`. Without a distance or a width the
-    object has the usual ones for its height. Beyond confidences of 0.05 and 0.9997 the chance
-    stays. Raises InvalidInput for other classes and levels, lengths that are not above 0, shares
-    that are not from 0 to 1, and confidences that are not between 0 and 1.
+    `label` is one of the five classes. Arguments are arrays of one shape, or numbers. Heights and
+    widths of the whole box are in pixels of KITTI's focal length (721.5), cut at the picture's
+    edges. `occlusion` is KITTI's level, 0 to 3. `truncation` is the share of the box beyond the
+    picture. Distances are planar, in metres. `cover` is the share that nearer boxes cover. A
+    missing distance or width takes the usual value for the height. Beyond confidences of 0.05 and
+    0.9997 the chance stays. Raises InvalidInput for other classes and levels, lengths that are not
+    above 0, and shares or confidences that are not from 0 to 1.
     """
     for name, length in (
         ("height_px", height_px),

@@ -45,23 +45,24 @@ from care_sim.sources.argoverse2.tables import (
     table,
 )
 from care_sim.sources.box_films import SPAN_S, AnnotatedBody, annotations_of, motions, sense
-from care_sim.sources.film_checks import report_once, tell_empty_boxes
+from care_sim.sources.film_checks import report_empty_boxes, report_once
 from care_sim.sources.nuscenes.sweeps import recorded_cloud
 from care_sim.sources.recordings import Recordings
 
 UP_LIDAR = (1.35, 0.0, 1.64)
 """Metres in the car's frame: `up_lidar` in the calibration of the Sensor Dataset guide."""
 CAR_FRAME_HEIGHT_M = 0.33
-"""The origin of the car's frame, the middle of its rear axle, stands this far above the road: the
-wheels' radius, and where the returns of a recorded sweep lie within 10 m."""
+"""Height of the car's origin, the middle of its rear axle, above the road. It is the wheels'
+radius, and fits the returns of a recorded sweep within 10 m.
+"""
 ARGOVERSE2_SENSOR_HEIGHT_M = UP_LIDAR[2] + CAR_FRAME_HEIGHT_M
 ARGOVERSE2_KEYFRAME_S = 0.5
 NANOSECONDS = 10**9
 LABELLED_SPLITS = ("train", "val")
 """Folders of the official download whose logs are annotated; those of `test` are not."""
 HALF_SWEEP_NS = NANOSECONDS // 20
-"""Annotations come at 10 Hz. The nearest is at most this far from a moment, unless a sweep holds
-none.
+"""Annotations come at 10 Hz. Largest distance of the nearest annotation from a moment, unless a
+sweep holds none.
 """
 
 
@@ -127,7 +128,7 @@ def argoverse2_film(log: Path, grid: AngularGrid | None = None, empty_boxes: boo
         reported = np.array([body.label is not None for body in bodies], bool)
         every.append(annotations_of([body for body in bodies if body.label is not None]))
         filled.append(holds[reported])
-    tell_empty_boxes(log.name, every, filled, grid.range_m)
+    report_empty_boxes(log.name, every, filled, grid.range_m)
     hidden = every[0].take(~(filled[0] | empty_boxes))
     return Film(
         log.name,

@@ -1,5 +1,5 @@
-"""Where cars and sensors of nuScenes stand, when its pictures were taken, and what they show when
-no detector was run: projected boxes with visibility.
+"""Poses of cars and sensors in nuScenes, times of pictures, and projected boxes with visibility, if
+no detector was run.
 """
 
 import math
@@ -194,15 +194,14 @@ MOST_APART_S = 0.5
 
 
 class Pictures(NamedTuple):
-    """The pictures of a keyframe, one per camera: the frame of the LiDAR when each was taken, and
-    `timing` (k, 2), its age in seconds and by how much the car has turned since.
+    """The pictures of a keyframe, one per camera: the LiDAR's frame when each was taken, and
+    `timing` (k, 2). Timing is the age in seconds and the car's yaw change since.
 
     The cameras take turns, each when the sweep passes its view, and the car drives on: at 9 m/s the
-    first picture is 0.4 m behind the sweep. Each picture is that of the LiDAR's frame at its own
-    time. Its detections have an age and a yaw change, so that wedges are turned back as those of
-    late cameras are. Two things are neglected: boxes are those of the sweep's time, however objects
-    move within 50 ms, and a wedge has no depth, so it cannot be moved by the way that the car has
-    driven.
+    first picture is 0.4 m behind the sweep. Each picture uses the LiDAR's frame at its own time.
+    Its detections have an age and a yaw change, so that wedges are turned back as for late cameras.
+    Two effects are neglected. Boxes are those of the sweep's time, though objects may move within
+    50 ms. A wedge has no depth, so it cannot be moved by the car's way.
     """
 
     moments: list[Frame]

@@ -28,7 +28,7 @@ from care_sim.sources.nuscenes.table_files import JsonRow, read_json
 from care_sim.sources.nuscenes.tables import Database
 
 FARTHEST_PX = 1e5
-"""How far a box may reach, within the picture or beside it, so that its area stays a number."""
+"""Largest coordinate of a box, so that its area stays finite."""
 SAME_OBJECT_IOU = 0.5
 """A detection lies on the object of its class whose projected box overlaps it at least this much
 (PASCAL VOC).
@@ -41,15 +41,16 @@ Found = tuple[int, float, Floats]
 class DetectionFile:
     """The detections of a file, by the token or the file name of their picture.
 
-    Two forms. nuScenes: rows with `sample_data_token`, `bbox_corners` (left, top, right, bottom),
-    `category_name` or `detection_name`, and `score` or `detection_score`, as a list or as a map
-    `results` from tokens to lists. COCO results: rows with `image_id`, `bbox` (left, top, width,
-    height), `category_id` and `score`; `image_id` is the token of the picture or its file name.
+    There are two forms. nuScenes: a list of rows, or a map `results` from tokens to lists. Rows
+    have `sample_data_token`, `bbox_corners` (left, top, right, bottom), `category_name` or
+    `detection_name`, and `score` or `detection_score`. COCO results: rows with `image_id`, `bbox`
+    (left, top, width, height), `category_id` and `score`; `image_id` is the token of the picture or
+    its file name.
 
-    Numbers of other pictures and categories are told by a map with the COCO rows as `annotations`,
-    `images` (rows with `id` and `file_name`), and `categories`: a name of
-    `care_sim.sources.nuscenes.categories.CATEGORY_MAPS`, or rows with `id` and `name`.
-    Known categories outside the five classes are left out.
+    For numbered pictures and categories, use a map with three entries. `annotations` are the COCO
+    rows, `images` rows with `id` and `file_name`. `categories` is a name of
+    `care_sim.sources.nuscenes.categories.CATEGORY_MAPS`, or rows with `id` and `name`. Known
+    categories outside the five classes are left out.
     """
 
     def __init__(self, path: Path):
@@ -212,8 +213,8 @@ MODALITIES = {
     "use_map": False,
     "use_external": False,
 }
-"""What the form's `meta` must tell. The camera decides where a policy looks, and the LiDAR measures
-the boxes.
+"""Required `meta` of the form. The camera decides where a policy looks, and the LiDAR measures the
+boxes.
 """
 MOST_BOXES = 500
 """A sample with more is refused."""

@@ -1,14 +1,14 @@
 """nuScenes scenes as films: recorded sweeps, annotations of the 2 Hz keyframes, six recorded
 cameras.
 
-A scene without any recorded sweep is played on its boxes, as Argoverse 2 logs are: boxes become
-bodies, those outside the five classes too, rays are cast at them, and the recorded cameras render
-them. Static surroundings are not annotated, so only boxes occlude.
+A scene without any recorded sweep is played on its boxes, like Argoverse 2 logs. All boxes become
+bodies, also those outside the five classes. Rays are cast at the bodies, and the recorded cameras
+render them. Static surroundings are not annotated, so only boxes occlude.
 
-Boxes without a LiDAR or radar point inside are left out, as the official evaluation leaves them
-out; those of the first keyframe are in `Film.hidden`, since the objects were present. They are no
-bodies either: nobody measured where they are, and a ray would hit what the LiDAR did not reach.
-With `empty_boxes` they are annotated, and bodies.
+Boxes without a LiDAR or radar point inside are left out, as in the official evaluation. Those of
+the first keyframe are in `Film.hidden`, since the objects were present. They are no bodies either:
+their place is not measured, and a ray would hit objects that the LiDAR did not reach. With
+`empty_boxes` they are annotated, and bodies.
 
 The car's motion is that of the keyframes' poses. Pictures are taken within 50 ms of the sweep
 (`care_sim.sources.nuscenes.cameras`).
@@ -29,7 +29,7 @@ from care_sim.core.types import CLASSES, Ego
 from care_sim.loops.film import Film, Shot
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud, IdentifiedDetections
 from care_sim.sources.box_films import AnnotatedBody, motions, sense
-from care_sim.sources.film_checks import AWAY_M, SIZES_M, report_once, tell_empty_boxes
+from care_sim.sources.film_checks import AWAY_M, SIZES_M, report_empty_boxes, report_once
 from care_sim.sources.nuscenes.cameras import (
     OWN,
     VISIBLE_SHARES,
@@ -149,14 +149,14 @@ def nuscenes_film(
     camera_times: str = OWN,
     empty_boxes: bool = False,
 ) -> Film:
-    """The film of a scene, in the cells of `grid` (the paper's, unless given). The cameras' boxes
-    come from `detections`, else from annotations. With more `sweeps` than one, keyframes have that
+    """Return the film of a scene, in the cells of `grid`, by default the paper's. The cameras'
+    boxes come from `detections`, else from annotations. With several `sweeps`, keyframes have that
     many: their own, and the last before it. `camera_times` and `empty_boxes` are those of
     `care_sim.sources.nuscenes.recordings.NuScenes`.
 
-    Raises InvalidInput for a token that points nowhere, a missing recording, a truncated sweep, a
-    sweep that is missing where others are there, a detection on what is no picture of a keyframe,
-    and for a scene without sweeps between its keyframes where some are asked for.
+    Raises InvalidInput for a token that points nowhere, a missing recording, a truncated sweep, or
+    a sweep that is missing among others. Also raises it for a detection on a picture outside
+    keyframes, and for a scene without the requested sweeps between keyframes.
     """
     if detections is not None:
         detections.check(database)
@@ -188,7 +188,7 @@ def nuscenes_film(
     shots, every, filled = zip(*(setup.shot(*moment) for moment in moments), strict=True)
     if sweeps > 1:
         shots = with_earlier_sweeps(database, samples, shots, lidar, grid, sweeps - 1)
-    tell_empty_boxes(scene["name"], every, filled, grid.range_m)
+    report_empty_boxes(scene["name"], every, filled, grid.range_m)
     return Film(
         scene["name"],
         tuple(camera.pinhole for camera in cameras),

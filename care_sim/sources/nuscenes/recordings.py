@@ -50,7 +50,7 @@ class NuScenes(Recordings):
     def scenes(self) -> list[str]:
         """The names of the split's scenes. Prints a line where an official one is held in part."""
         names = list(self._rows())
-        tell_missing(_database(self.folder, self.version), self.split)
+        report_missing(_database(self.folder, self.version), self.split)
         return names
 
     def film(self, scene: str) -> Film:
@@ -180,8 +180,8 @@ split `test` has none.
 
 
 def split_scenes(database: Database, split: str = "val") -> list[JsonRow]:
-    """The scenes of a split that the database holds: of an official split, of `all`, or of a split
-    in `<root>/<version>/splits.json`, a map from names of splits to lists of names of scenes.
+    """Return the database's scenes of a split: an official one, `all`, or one in
+    `<root>/<version>/splits.json`. That file maps names of splits to lists of names of scenes.
 
     Raises InvalidInput for an unknown split, a scene of `splits.json` that the database lacks, and
     an empty split.
@@ -208,7 +208,7 @@ def split_scenes(database: Database, split: str = "val") -> list[JsonRow]:
     return [by_name[name] for name in known[split]]
 
 
-def tell_missing(database: Database, split: str) -> None:
+def report_missing(database: Database, split: str) -> None:
     """Print a line once where the database holds only some scenes of an official split."""
     names = () if split in _own_splits(database) else OFFICIAL.get(split, ())
     held = {row["name"] for row in database.rows("scene").values()}

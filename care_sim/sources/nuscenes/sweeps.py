@@ -79,8 +79,9 @@ def read_points(path: Path) -> Floats:
 def recorded_cloud(
     points: Floats, grid: AngularGrid, annotations: Annotations, sensor: Frame
 ) -> Cloud:
-    """The points (n, 3), or (n, 5) with intensities and rings, that a ray of `grid` could have
-    returned, each with the annotated box that it lies in; those beyond its reach are far.
+    """Return the points that a ray of `grid` could have returned, each with the annotated box that
+    it lies in. Points are (n, 3), or (n, 5) with intensities and rings. Those beyond the reach are
+    far.
     """
     near, far = (
         cloud_of_points(*points_of_grid(points, grid, beyond), annotations, sensor)
@@ -104,8 +105,8 @@ def cloud_of_points(cells: Cells, points: Floats, annotations: Annotations, sens
 
 
 def points_of_grid(points: Floats, grid: AngularGrid, beyond: bool = False) -> tuple[Cells, Floats]:
-    """Return those of points (n, 3 or more) that a ray of `grid` could have returned, in the order
-    of their cells, and the cells first; or those `beyond` its reach.
+    """Return cells and points (n, 3 or more) that a ray of `grid` could have returned, in the order
+    of cells; or those `beyond` its reach.
     """
     ranges = np.linalg.norm(points[:, :3], axis=1)
     cells = grid.cells_of(points[:, :3])

@@ -1,5 +1,5 @@
-"""The JSON files of a nuScenes database: rows of plain data, each field of its kind. What was
-recorded and annotated at every sample is kept in a file that all processes share (SQLite).
+"""The JSON files of a nuScenes database: rows of plain data, each field of its kind. The recordings
+and annotations of every sample are stored in a file that all processes share (SQLite).
 """
 
 import fcntl
@@ -61,9 +61,9 @@ FIELDS: dict[str, dict[str, type]] = {
     "category": {"name": str},
     "visibility": {"level": str},
 }
-"""What is read of each table, beside its token."""
+"""Fields read from each table, beside its token."""
 KIND_WORDS = {str: "text", int: "a whole number", bool: "true or false", list: "a list"}
-"""What the kinds of values are called."""
+"""Names of the kinds of values in messages."""
 
 
 def read_json(path: Path) -> Any:
@@ -91,7 +91,7 @@ def table_rows(path: Path, is_needed: Callable[[JsonRow], bool] | None = None) -
         taken = {name: row.get(name) for name in kinds}
         # Not isinstance: to Python true is an int.
         if [*map(type, taken.values())] != wanted:
-            raise InvalidInput(f"{path}: {_what_is_wrong(row, number, kinds)}")
+            raise InvalidInput(f"{path}: {_describe_fault(row, number, kinds)}")
         yield taken
 
 
@@ -128,7 +128,7 @@ def _readable(path: Path) -> Iterator[None]:
         raise InvalidInput(f"{path}: no readable JSON file ({error})") from error
 
 
-def _what_is_wrong(row: JsonRow, number: int, kinds: dict[str, type]) -> str:
+def _describe_fault(row: JsonRow, number: int, kinds: dict[str, type]) -> str:
     which = f"row {row.get('token') or number}"
     name = next(name for name, kind in kinds.items() if type(row.get(name)) is not kind)
     return (
@@ -166,15 +166,15 @@ class SampleStore:
     """The rows of a database by sample.
 
     The tables `sample_data`, `ego_pose` and `sample_annotation` of all of nuScenes hold six million
-    rows in 2.6 GB of text, most of which are of no use here. They are read once, row by row. What
-    is kept of a sample are its boxes, each of which tells whether it `has_points`
-    instead of how many; its recordings of keyframes, and all of the calibrated sensors `lidars`,
-    together about one in four; the poses of the car at these, of cameras only of `cameras`.
+    rows in 2.6 GB of text, most of them unneeded. They are read once, row by row. The store keeps a
+    sample's boxes, with a flag `has_points` instead of their number. It keeps recordings of
+    keyframes, and all of the calibrated sensors `lidars`, together about one in four. It keeps the
+    car's poses at these recordings, for cameras only those of `cameras`.
 
-    It is kept in the user's cache folder (`XDG_CACHE_HOME`, else `~/.cache`). It is made anew when
-    a table has changed, and by every process where nothing can be kept. Of processes that want it
-    at once the first makes it. Raises InvalidInput as `table_rows` does, for a token that stands
-    twice, and for a box of a sample that there is not.
+    The store is in the user's cache folder (`XDG_CACHE_HOME`, else `~/.cache`). It is made anew
+    when a table has changed, and by every process if it cannot be stored. If several processes need
+    it at once, the first makes it. Raises InvalidInput as `table_rows` does, for a repeated token,
+    and for a box of a missing sample.
     """
 
     def __init__(

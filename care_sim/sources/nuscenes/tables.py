@@ -47,9 +47,7 @@ class Database:
         return self.folder / f"{table}.json"
 
     def rows(self, table: str) -> dict[str, JsonRow]:
-        """The rows of a short table by token. What was recorded and annotated is asked for by its
-        sample.
-        """
+        """The rows of a short table by token. Recordings and annotations are read by sample."""
         if table not in self._tables:
             rows = list(table_rows(self.path(table)))
             check_tokens(self.path(table), [row["token"] for row in rows])

@@ -61,7 +61,7 @@ def in_seconds(times: Floats) -> Floats:
 
 _AXES = ("x", "y", "z")
 COLUMNS = (*_AXES, "intensity", "ring")
-"""What is told of every point; other columns of files are left out."""
+"""Columns of every point; other columns of files are left out."""
 _MOST_HEADER_LINES = 100
 _KINDS = {"F": "f", "I": "i", "U": "u"}
 
@@ -202,4 +202,4 @@ READERS: dict[str, Callable[[Path], Floats]] = {
     ".csv": _csv,
     ".bin": _bin,
 }
-"""What reads a file, by the end of its name."""
+"""Reader of a file, by the end of its name."""

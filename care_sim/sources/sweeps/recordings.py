@@ -168,24 +168,24 @@ class Sweeps(Recordings):
       (`care_sim.sources.sweeps.points.read_sweep`). A name is a time: nanoseconds, microseconds or
       milliseconds since 1970, or seconds with a decimal point. Otherwise `times.csv` has the
       columns file and time.
-    - `poses.csv`: the pose of the car (the point on the road below its middle, x ahead, y left,
-      z up) in a fixed world: columns time, x, y, z (metres), and yaw (radians) or qx, qy, qz, qw.
-      Times are of the same clock as the sweeps'. A single row is a car that stands.
-    - `camera_boxes.json`, if any: what a 2D detector reported
-      (`care_sim.sources.sweeps.films`); beside `drive.mcap` it is `drive.camera_boxes.json`.
-      Without it CARE has no residual: it fires as history does.
+    - `poses.csv`: the pose of the car (the point on the road below its middle, x ahead, y left, z
+      up) in a fixed world. Columns: time, x, y, z (metres), and yaw (radians) or qx, qy, qz, qw.
+      Times use the clock of the sweeps. A single row is a car that stands.
+    - `camera_boxes.json`, optional: the boxes of a 2D detector (`care_sim.sources.sweeps.films`);
+      beside `drive.mcap` it is `drive.camera_boxes.json`. Without it CARE has no residual: it fires
+      as history does.
 
     The folder is a scene, or its sub-folders and MCAP files are scenes. The option `sensor`, else
     `sensor.toml` in the folder or beside it, is the set-up: rows and reach of the LiDAR, its height
     (`position_m`) and the cameras. The default is `hdl-32e`. Points are in the LiDAR's axes, x
-    ahead, y left, z up. Where x is to the right and y ahead, turn them, or give the set-up
-    `yaw_deg = -90`; what was learned does not fit that grid.
+    ahead, y left, z up. If x is to the right and y ahead, turn them, or give the set-up `yaw_deg =
+    -90`; learned weights do not fit that grid.
 
-    Keyframes are 0.5 s apart. The detector `reference` gets all points of a keyframe. What it
-    detects and tracks becomes the annotations, and a cluster that appears within range is a first
-    sighting, as in the paper's vehicle study (Sec. 5.5). Limitations: a reference is no truth. A
-    false cluster that lasts is an event, an object that the full scan misses is none, and a track
-    that breaks becomes two objects. Classes are guesses by size.
+    Keyframes are 0.5 s apart. The detector `reference` gets all points of a keyframe. Its tracked
+    detections become the annotations, and a cluster that appears within range is a first sighting,
+    as in the paper's vehicle study (Sec. 5.5). Limitations: a reference is no truth. A false
+    cluster that lasts is an event, an object that the full scan misses is none, and a track that
+    breaks becomes two objects. Classes are guesses by size.
     """
 
     kind = "sweeps"

@@ -1,4 +1,4 @@
-"""The paper's ablations (Sec. 5.4), in the closed and in the open loop: one thing is varied at a
+"""The paper's ablations (Sec. 5.4), in the closed and in the open loop: one factor varies at a
 time.
 """
 
@@ -18,9 +18,9 @@ ABLATION_PLACES = tuple(
     Place(*place)
     for place in (("dartout", 0.03), ("dartout", 0.10), ("dense", 0.02), ("dense", 0.03))
 )
-"""The dart-out at the paper's tightest budget and at the one it reports, the dense street at the
-tightest and below: with more the reserve holds every wedge whole, and nothing that is varied here
-could show.
+"""The dart-out at the paper's tightest budget and at the reported one, the dense street at the
+tightest and below. At larger budgets the reserve holds every wedge whole, and the varied factors
+have no effect.
 """
 _REFERENCES = ("history", "all-camera")
 _QUARTER = 4
@@ -29,7 +29,7 @@ _QUARTER = 4
 
 @dataclass(frozen=True)
 class Ablation:
-    """A policy at several levels of one thing, beside `references` under the same conditions."""
+    """A policy at several levels of one factor, beside `references` under the same conditions."""
 
     title: str
     policy: str
@@ -38,7 +38,7 @@ class Ablation:
     notes: tuple[str, ...] = ()
 
     def beside(self, also: Sequence[str]) -> list[str]:
-        """The references, and of further policies those that feel what is varied."""
+        """Return the references, and the further policies that depend on the factor."""
         varies_conditions = any(level.changes for level in self.levels)
         return [*self.references, *(also if varies_conditions else ())]
 
@@ -124,14 +124,14 @@ IDEAS = Ablation(
 _OF_BOTH_LOOPS = (RESERVE_FRACTION, MARGINS, CONFIDENCE, LATENCY)
 _OF_POLICIES = (RESERVE_ORDER, GUARD, SIGMA, DECAY)
 ABLATIONS = (*_OF_BOTH_LOOPS, FLOOR_SEED, *_OF_POLICIES)
-"""Those of the closed loop."""
+"""Ablations of the closed loop."""
 OPEN_ABLATIONS = (*_OF_BOTH_LOOPS, *_OF_POLICIES, STATIC, CELL_ORDER, IDEAS)
-"""Those of the open loop, with one floor as in the paper; the last is ours."""
+"""Ablations of the open loop, with one floor as in the paper; the last is ours."""
 
 
 def ablation_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeConfig]:
-    """Every ablation in every place, and the full scan; `also` are further policies that feel the
-    conditions.
+    """Return every ablation in every place, and the full scan. `also` are further policies that
+    depend on the conditions.
     """
     made: list[EpisodeConfig] = []
     for place in ABLATION_PLACES:
@@ -145,8 +145,8 @@ def ablation_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[Episo
 def ablation_plays(
     source: Source, scenes: Sequence[Scene], budgets: Sequence[float], also: Sequence[str] = ()
 ) -> list[PlayConfig]:
-    """Every ablation of the open loop at every budget, and the full scan; `also` are further
-    policies that feel the conditions.
+    """Return every ablation of the open loop at every budget, and the full scan. `also` are further
+    policies that depend on the conditions.
     """
     made = USUAL_VARIANT.plays(source, scenes, budgets, [FULL])
     for level, policies in _played(OPEN_ABLATIONS, also):
@@ -155,8 +155,8 @@ def ablation_plays(
 
 
 def _played(ablations: Sequence[Ablation], also: Sequence[str]) -> list[tuple[Variant, list[str]]]:
-    """Return the variants and policies of each ablation: the policy itself at every level, and the
-    others under the conditions of the level, whose parameters they do not have.
+    """Return the variants and policies of each ablation. The policy itself plays at every level,
+    the others under the level's conditions, without its parameters.
     """
     played: list[tuple[Variant, list[str]]] = []
     for ablation in ablations:
@@ -166,8 +166,8 @@ def _played(ablations: Sequence[Ablation], also: Sequence[str]) -> list[tuple[Va
 
 
 def quarter_of(scenes: Sequence[Scene]) -> list[Scene]:
-    """One of every four scenes: of the first four the first, of the next four the second, and so
-    on. Layouts of streets take turns by four, so that every fourth street is straight.
+    """Return one of every four scenes: the first of the first four, the second of the next four,
+    and so on. Street layouts repeat every four scenes, so every fourth street would be straight.
     """
     return [
         scene

@@ -1,5 +1,5 @@
-"""Policies and budgets of studies that options show and change. Nothing is imported here, so that
-help loads no simulator.
+"""Policies and budgets of studies, as defaults of options. Nothing is imported here, so that help
+loads no simulator.
 """
 
 NCAP_POLICIES = ("history", "all-camera", "care", "care-sightlines", "fan", "full")
@@ -9,20 +9,20 @@ NCAP_STEP_KPH = 10.0
 
 R157_POLICIES = ("history", "all-camera", "care", "fan", "full")
 R157_BUDGETS = (0.01, 0.03)
-"""At 3% a pattern that looks ahead finds as much as a camera (`results/camera.md`)."""
+"""At 3% a pattern ahead detects as much as a camera (`results/camera.md`)."""
 
 FIRING_POLICIES = ("care", "care-sightlines", "care-units", "rows", "place", "full")
 
 FILM_POLICIES = ("history", "all-camera", "care", "care-sightlines", "rows", "place", "full")
 FILM_BUDGETS = (0.01, 0.03, 0.1)
-"""Of the study of realism, for first sightings."""
+"""Policies of the realism study, for first sightings."""
 
 PROTOCOL_POLICIES = (
     *("history", "history-uniform", "all-camera", "uncertainty", "beam-reduce", "random"),
     *("care", "care-sbf", "learned-scorer", "care-sightlines", "rows", "place", "full"),
 )
-"""Those of the paper's Sec. 5.1, `random`, which is the floor alone, and the best patterns without
-a camera.
+"""Policies of the paper's Sec. 5.1, `random` (only the floor), and the best patterns without a
+camera.
 """
 ORDERED_POLICIES = (
     *("history", "all-camera", "care", "care-sbf", "care-sightlines", "care-sector"),

@@ -1,4 +1,4 @@
-"""The study of faults: every fault of camera, LiDAR and odometry grows from none of it to much."""
+"""The study of faults: every fault of camera, LiDAR and odometry, from none to strong."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,22 +12,20 @@ from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.run_config import Row
 
 FAULT_PLACES = (Place("dartout", 0.10), Place("dense", 0.03))
-"""The paper's own: the budget at which it injects faults, and the one at which it tells the
-reserves apart.
-"""
+"""The paper's budgets: for injected faults, and for comparing the reserves."""
 FAULT_POLICIES = ("history", "all-camera", "care", "full")
 _BLACKOUT_START_S = 2.0
 """Seconds. The person comes into the camera's view 2.4 to 2.9 s after the start."""
 _DEAD: tuple[tuple[int, ...], ...] = ((), (11,), (10, 11), (10, 11, 12), (9, 10, 11, 12))
-"""Grown out of the middle of the rows that meet a person at the full scan's 16 m, 1 to 6 degrees
-below the horizon.
+"""Dead rows grow from the middle of the rows that meet a person at the full scan's 16 m, 1 to 6
+degrees below the horizon.
 """
 
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault from none of it, the first level, to much of it. The labels of the levels are its
-    strength in `unit`.
+    """A fault from none, the first level, to strong. The labels of the levels are its strength in
+    `unit`.
     """
 
     title: str
@@ -107,8 +105,9 @@ _SHARED = {*DEFAULTS, "sensor", "sensor_hash", "detector"} - _VARIED
 def fault_study(
     seeds: Sequence[int], also: Sequence[str] = (), **common: Any
 ) -> list[EpisodeConfig]:
-    """Every policy at every strength of every fault in both places; `also` are further policies,
-    `common` further fields of `EpisodeConfig`. Raises InvalidInput for one that is a fault.
+    """Return every policy at every strength of every fault in both places. `also` are further
+    policies, `common` further fields of `EpisodeConfig`. Raises InvalidInput for a field that is a
+    fault.
     """
     for name in sorted(_VARIED):
         if common.get(name, DEFAULTS[name]) != DEFAULTS[name]:
@@ -125,5 +124,5 @@ def fault_study(
 
 
 def faults_alone(rows: Sequence[Row]) -> list[Row]:
-    """The rows as if nothing but the faults had been asked for: what all share is left out."""
+    """Return the rows with only their faults: conditions shared by all rows are left out."""
     return [{name: value for name, value in row.items() if name not in _SHARED} for row in rows]

@@ -1,4 +1,4 @@
-"""Studies of what is fired: under every hardware, and in every order of the cells inside a set."""
+"""Studies of firing: under every hardware, and in every order of the cells inside a set."""
 
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple, TypeVar
@@ -11,14 +11,14 @@ from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.sources.scenes import Scene, Source
 from care_sim.study.designs.defaults import FIRING_POLICIES
 from care_sim.study.designs.paper import paper_study
-from care_sim.study.designs.variants import tried_out
+from care_sim.study.designs.variants import keep_playable
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.play_config import PlayConfig, play_grid
 from care_sim.study.rows.reading import policy_of
 from care_sim.study.run_config import FULL, Row
 
 FIRINGS = tuple(map(settled, HARDWARE))
-"""Every kind of hardware with its usual numbers."""
+"""Every kind of hardware with its default numbers."""
 AWARE = "care-units"
 """The policy that knows its hardware, with which the others are compared."""
 FIRING_BUDGETS = (0.03, 0.05, 0.1)
@@ -36,8 +36,8 @@ class Fitting(NamedTuple):
 
 
 def fitting(sensor: str | SensorSetup, policies: Sequence[str] = FIRING_POLICIES) -> Fitting:
-    """Return the part of the study that fits a set-up: units that divide its grid and of which the
-    least budget buys one, and those of the `policies` that have no weights of another grid.
+    """Return the part of the study that fits a set-up. Units must divide its grid and fit the
+    smallest budget; `policies` must have no weights of another grid.
     """
 
     def tasks(policy: str, budget: float, firing: str = CELLS) -> list[EpisodeConfig]:
@@ -45,8 +45,8 @@ def fitting(sensor: str | SensorSetup, policies: Sequence[str] = FIRING_POLICIES
 
     where = f"with {sensor_setup(sensor).name}"
     least, *_, most = FIRING_BUDGETS
-    firings = tried_out(FIRINGS, lambda firing: tasks("random", least, firing), where)
-    played = tried_out(policies, lambda policy: tasks(policy, most), where)
+    firings = keep_playable(FIRINGS, lambda firing: tasks("random", least, firing), where)
+    played = keep_playable(policies, lambda policy: tasks(policy, most), where)
     return Fitting(firings.sound, played.sound, [*firings.left_out, *played.left_out])
 
 
@@ -55,8 +55,8 @@ def firing_study(
     also: Sequence[str] = (),
     sensors: Sequence[str | SensorSetup] = (DEFAULT_SETUP,),
 ) -> list[EpisodeConfig]:
-    """The dense street with every set-up under every hardware that fits it; `also` are further
-    policies.
+    """Return the dense street with every set-up under every hardware that fits it; `also` are
+    further policies.
     """
     configs = []
     for sensor in sensors:
@@ -66,7 +66,7 @@ def firing_study(
             configs += grid(
                 ["dense"], policies, FIRING_BUDGETS, seeds, firing=firing, sensor=sensor
             )
-    # The full scan feels no hardware, and is played once for all.
+    # The full scan does not depend on hardware, and is played once for all.
     return [*dict.fromkeys(configs)]
 
 
@@ -87,9 +87,7 @@ def firing_plays(
 
 
 def rows_by_firing(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    """The rows of every hardware that was played, as if none had been asked for, with the full scan
-    among each.
-    """
+    """Return the rows of every played hardware, without its condition, each with the full scan."""
     full = [row for row in rows if row["policy"] == FULL]
     by_firing: dict[str, list[Row]] = {}
     for row in rows:
@@ -106,14 +104,14 @@ ORDERS = CELL_ORDERS[1:]
 BASE_ORDER = "rows-down"
 """The order of the paper's policies here, with which the others are compared."""
 MIRRORED_ORDER = "rows-up"
-"""Its mirror image: as ascending as the other, where rows are numbered from the bottom."""
+"""The mirrored order: ascending if rows are numbered from the bottom."""
 
 
 def order_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeConfig]:
-    """The paper's closed-loop study under every order, 279 configurations a seed; `also` are
-    further policies.
+    """Return the paper's closed-loop study under every order, 279 configurations per seed; `also`
+    are further policies.
     """
-    return _felt(
+    return _drop_unused_orders(
         config for order in ORDERS for config in paper_study(seeds, also, cell_order=order)
     )
 
@@ -126,16 +124,16 @@ def order_plays(
     floor_seeds: Sequence[int] = (0,),
 ) -> list[PlayConfig]:
     """The first-sighting protocol under every order."""
-    return _felt(
+    return _drop_unused_orders(
         config
         for order in ORDERS
         for config in play_grid(source, scenes, policies, budgets, floor_seeds, cell_order=order)
     )
 
 
-def _felt(configs: Iterable[_Config]) -> list[_Config]:
-    """The configurations without the order where it is not felt, each once: patterns and the full
-    scan are played once for all orders.
+def _drop_unused_orders(configs: Iterable[_Config]) -> list[_Config]:
+    """Return the configurations, each once, without the order for policies that do not depend on
+    it: patterns and the full scan are played once for all orders.
     """
     return list(
         dict.fromkeys(
@@ -146,8 +144,8 @@ def _felt(configs: Iterable[_Config]) -> list[_Config]:
 
 
 def rows_by_order(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    """The rows of every order that was played, with those that feel none, as if no order had been
-    asked for: the rows of the paper's study once for each.
+    """Return the rows of every played order, without its condition: the rows of the paper's study
+    per order. Policies that do not depend on the order are in each.
     """
     played = {row["cell_order"] for row in rows}
     by_order = {
@@ -164,6 +162,8 @@ def rows_by_order(rows: Sequence[Row]) -> dict[str, list[Row]]:
 
 
 def without_order(rows: Iterable[Row]) -> list[str]:
-    """The policies that feel no order and were played once for all, the full scan first."""
+    """Return the policies that do not depend on the order and were played once for all, the full
+    scan first.
+    """
     found = dict.fromkeys(policy_of(row) for row in rows if row["cell_order"] == AS_DEMANDED)
     return sorted(found, key=lambda policy: policy != FULL)

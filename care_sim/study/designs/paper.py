@@ -1,5 +1,5 @@
-"""The closed-loop study of the paper (Sec. 5.6): its 49 configurations, what it published of them,
-and its dense street with more and more vehicles.
+"""The closed-loop study of the paper (Sec. 5.6): its 49 configurations, its published results, and
+its dense street with growing numbers of vehicles.
 """
 
 from collections.abc import Sequence
@@ -20,21 +20,21 @@ _POLICIES = (*_BUDGETED, "full")
 def paper_study(
     seeds: Sequence[int], also: Sequence[str] = (), cell_order: str = AS_DEMANDED
 ) -> list[EpisodeConfig]:
-    """The episodes of the study, 49 a seed; five seeds give the paper's 245. `also` are further
-    policies, `cell_order` is that of all (`care_sim.core.cells.order`).
+    """Return the episodes of the study, 49 per seed; five seeds give the paper's 245. `also` are
+    further policies, `cell_order` is the order of all (`care_sim.core.cells.order`).
 
-    The paper states the total, the scenes and the conditions; this split is ours: budgets on the
-    dense street (17) and in the dart-out (13), the cut-in (5), missed detections (8) and camera
-    latency (6).
+    The paper states the total, the scenes and the conditions. Our split: budgets on the dense
+    street (17) and in the dart-out (13), the cut-in (5), missed detections (8) and camera latency
+    (6).
     """
     policies = list(dict.fromkeys([*_POLICIES, *also]))
     impaired = [policy for policy in policies if policy != "full"]
     lagging = [policy for policy in impaired if policy != "history"]
     played = partial(grid, seeds=seeds, cell_order=cell_order)
     return [
-        # The full scan has one budget: 4 x 4 + 1, then 4 x 3 + 1, then 4 + 1. History asks no
-        # camera, so that latency is played without it. Further policies are played under all
-        # conditions, patterns too, so that they stand beside the others in every table.
+        # The full scan has one budget: 4 x 4 + 1, then 4 x 3 + 1, then 4 + 1. History has no
+        # camera, so it is not played with latency. Further policies are played under all
+        # conditions, patterns too, so that every table holds them.
         *played(["dense"], policies, (0.03, 0.05, 0.10, 0.20)),
         *played(["dartout"], policies, (0.03, 0.05, 0.10)),
         *played(["cutin"], policies, (0.10,)),
@@ -50,8 +50,8 @@ VEHICLES_COLUMN = "scenario.vehicles"
 
 
 def crowding_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeConfig]:
-    """The dense street with 0 to 12 standing vehicles, at eight budgets from 1 to 35%: 221
-    configurations a seed. `also` are further policies.
+    """Return the dense street with 0 to 12 standing vehicles, at eight budgets from 1 to 35%: 221
+    configurations per seed. `also` are further policies.
     """
     policies = [*dict.fromkeys([*CROWDING_POLICIES, *also])]
     crowds = [(("vehicles", vehicles),) for vehicles in range(len(VEHICLE_PLACES) + 1)]
@@ -64,8 +64,8 @@ def crowding_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[Episo
 
 @cache
 def paper_cells() -> frozenset[Key]:
-    """Setting, policy and budget of every cell of the study."""
-    # The seed is in no key, so that one seed tells all cells.
+    """Return setting, policy and budget of every cell of the study."""
+    # The seed is in no key, so one seed gives all cells.
     return frozenset(key_of(config.row()) for config in paper_study([0]))
 
 
@@ -85,8 +85,8 @@ class PublishedResult(NamedTuple):
     """Results of the paper for some cells of the study, and the sentence that gives them; None
     where the paper gives none.
 
-    `detection_m` is the first detection in metres; in `braked` of `PAPER_EPISODES` the car braked;
-    `relation` stands in the place of numbers. `faults`: the camera was impaired.
+    `detection_m` is the first detection in metres. The car braked in `braked` of `PAPER_EPISODES`.
+    `relation` replaces numbers. With `faults` the camera was impaired.
     """
 
     scenario: str
@@ -125,7 +125,7 @@ NO_COLLISION = "No episode collides under the fixed physics, so we report detect
 PAPER_EPISODES = 5
 """Episodes, one per seed, of every cell of the paper's study."""
 DARTOUT_CAMERA = DartoutResult(detection_m=15.0, braked=5, pass_m=5.7)
-"""Of the camera policies, "about" 15 m and at least 5.7 m."""
+"""Detection of the camera policies: "about" 15 m and at least 5.7 m."""
 DARTOUT_HISTORY = DartoutResult(detection_m=11.9, braked=3, pass_m=4.0)
 DENSE_CARE_M = 15.1
 DENSE_FULL_M = 15.1

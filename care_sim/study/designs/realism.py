@@ -1,5 +1,5 @@
-"""The study of realism: the worlds of the headline tables under conditions of a real car, one at a
-time and together, in either loop.
+"""The realism study: the worlds of the headline tables under conditions of a real car, one at a
+time and together, in both loops.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -13,7 +13,14 @@ from care_sim.scenarios.ncap.table import TESTS
 from care_sim.sources.scenes import Scene, Source
 from care_sim.study.designs.defaults import NCAP_STEP_KPH
 from care_sim.study.designs.standards import NcapCase, ncap_cases
-from care_sim.study.designs.variants import FilmPlace, Group, Place, TriedOut, Variant, tried_out
+from care_sim.study.designs.variants import (
+    FilmPlace,
+    Group,
+    Place,
+    TriedOut,
+    Variant,
+    keep_playable,
+)
 from care_sim.study.episode_config import EpisodeConfig, of_cases
 from care_sim.study.play_config import PlayConfig
 from care_sim.study.run_config import FULL, RunConfig
@@ -22,7 +29,8 @@ IDEAL = Variant("ideal")
 """The conditions of the headline tables, with which every other one is compared."""
 _YOLOX = {"camera_profile": YOLOX_CAMERA}
 # The age is the mean of the paper's vehicle, 0.11 to 0.14 s. The closed loop has a picture of that
-# instant, a film none between its keyframes, 0.5 s apart: there the newest or the one before.
+# instant. A film has pictures only at its keyframes, 0.5 s apart: it uses the newest or the one
+# before.
 LATE_CAMERA = Variant("yolox camera, 0.12 s late", _YOLOX | {"camera_latency_s": 0.12})
 FILM_CAMERA = Variant("yolox camera", _YOLOX)
 LATE_FILM_CAMERA = Variant("yolox camera, 0.5 s late", _YOLOX | {"camera_latency": 1})
@@ -39,10 +47,9 @@ _FIRINGS = tuple(
 _RETURNS = (
     Variant("sweep of 0.1 s", _TURN),
     Variant("range 40 m", _RANGE),
-    # Whether fog or rain takes the light away is the same to the formula: this is also the rain at
-    # which one sees 50 m.
+    # The formula does not distinguish fog and rain: this is also the rain with 50 m of sight.
     Variant("range 40 m, visibility 50 m", _RANGE | {"visibility_m": 50.0}),
-    # From 50 mm/h on the Met Office calls a shower violent: no rain that a car often meets is more.
+    # The Met Office calls a shower violent from 50 mm/h on: cars rarely meet more rain.
     Variant("range 40 m, rain 50 mm/h", _RANGE | {"rain_mm_h": 50.0}),
 )
 CORE_FIRST = Variant("core of every set first", {"cell_order": "core-spread"})
@@ -50,8 +57,8 @@ CORE_FIRST = Variant("core of every set first", {"cell_order": "core-spread"})
 
 
 def _cars(camera: Variant) -> tuple[Variant, ...]:
-    """Camera, sweep and range together, in clear air: with free cells, and with the units that a
-    spinning sensor fires.
+    """Return camera, sweep and range together, in clear air: with free cells, and with the units of
+    a spinning sensor.
     """
     together = {**camera.changes, **_TURN, **_RANGE}
     segments = {"firing": settled("segments")}
@@ -62,7 +69,7 @@ def _cars(camera: Variant) -> tuple[Variant, ...]:
 
 
 CONDITIONS = (IDEAL, LATE_CAMERA, *_FIRINGS, *_RETURNS, CORE_FIRST, *_cars(LATE_CAMERA))
-"""Those of the closed loop."""
+"""Levels of the closed loop."""
 FILM_CONDITIONS = (
     IDEAL,
     FILM_CAMERA,
@@ -72,22 +79,22 @@ FILM_CONDITIONS = (
     CORE_FIRST,
     *_cars(FILM_CAMERA),
 )
-"""Those of the open loop."""
+"""Levels of the open loop."""
 
 Pair = tuple[str, str]
-"""Two policies, of which a headline says how the first stands to the second."""
+"""Two policies that a headline compares."""
 _MOST_KPH = 40.0
-"""Up to here the full scan avoids all of the Euro NCAP tests but `CPNCO-50`, and above it not for
-what the car sees but for how it brakes (`results/camera.md`).
+"""Up to this speed the full scan avoids all Euro NCAP tests but `CPNCO-50`. Above it, braking is
+the limit, not sensing (`results/camera.md`).
 """
 
 
 @dataclass(frozen=True)
 class Headline(Group):
     """A headline table: its worlds, which share scenario and budget, its policies, and the pairs
-    whose order it tells. `by_collisions` says that it counts who is hit.
+    that it compares. With `by_collisions` it counts collisions.
 
-    Of the seeds that are asked for, moved on by `first_seed`, it plays at most `most_seeds`.
+    It plays at most `most_seeds` of the requested seeds, shifted by `first_seed`.
     """
 
     policies: tuple[str, ...]
@@ -102,7 +109,7 @@ class Headline(Group):
         return self.name.removesuffix("%").replace(", ", "-")
 
     def seeds(self, asked: Sequence[int]) -> list[int]:
-        """Return the seeds that it plays. Raises InvalidInput where they are of another split."""
+        """Return the seeds that it plays. Raises InvalidInput if they are of another split."""
         played = [seed + self.first_seed for seed in asked[: self.most_seeds]]
         split_of([*asked, *played])
         return played
@@ -114,8 +121,8 @@ def _street(scenario: str, budget: float, *pairs: Pair) -> Headline:
 
 
 def _hardest_cases() -> Iterator[NcapCase]:
-    """Each test at the highest of its speeds up to `_MOST_KPH`, cars that hide the target reported.
-    Tests that are only run faster are left out.
+    """Return each test at its highest speed up to `_MOST_KPH`, with reported occluders. Tests with
+    only higher speeds are left out.
     """
     cases = ncap_cases(tuple(TESTS), NCAP_STEP_KPH)
     for name in TESTS:
@@ -133,7 +140,7 @@ def _ncap(budget: float) -> Headline:
         policies,
         (("care", "history"), ("care", "history-place")),
         by_collisions=True,
-        # The seeds of a test are nearly copies of it: tests are what is paired.
+        # The seeds of a test are nearly copies of it, so tests are paired.
         most_seeds=1,
     )
 
@@ -194,14 +201,14 @@ def _fitting(
     """
     for config in tasks(IDEAL):
         config.try_out()
-    return tried_out(levels, tasks, f"in {place}", lambda level: level.label)
+    return keep_playable(levels, tasks, f"in {place}", lambda level: level.label)
 
 
 def realism_study(
     seeds: Sequence[int], also: Sequence[str] = (), headlines: Sequence[Headline] = HEADLINES
 ) -> list[EpisodeConfig]:
-    """Headline tables of the closed loop under every condition; `also` are further policies of
-    all.
+    """Return headline tables of the closed loop under every condition; `also` are further policies
+    of all.
     """
     made: list[EpisodeConfig] = []
     # All seeds are looked at before the first configuration is made.

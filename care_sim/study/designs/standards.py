@@ -31,8 +31,8 @@ _CROSSED_BY_CARS = {
 
 @dataclass(frozen=True)
 class NcapCase:
-    """A test at a pair of speeds. `reported` says whether perception reports the cars that hide the
-    target, None where there are none.
+    """A test at a pair of speeds. `reported` is True if perception reports the cars that hide the
+    target, None without such cars.
     """
 
     test: str
@@ -42,7 +42,7 @@ class NcapCase:
 
     @property
     def parameters(self) -> Parameters:
-        """As parameters of the scenario."""
+        """Return the case as parameters of the scenario."""
         given: dict[str, Any] = {
             "test": self.test,
             "speed_kph": self.ego_kph,
@@ -54,8 +54,8 @@ class NcapCase:
 
 
 def ncap_cases(tests: Sequence[str], step_kph: float) -> list[NcapCase]:
-    """The tests at the protocol's speeds that are multiples of `step_kph`. A car that crosses has
-    the ego's speed. A test with cars that hide the target comes twice: both readings.
+    """Return the tests at the protocol's speeds that are multiples of `step_kph`. A crossing car
+    has the ego's speed. A test with cars that hide the target comes twice: reported and not.
     """
     return [
         NcapCase(name, each.ego_kph, each.target_kph, reported)
@@ -75,8 +75,8 @@ def ncap_study(
     step_kph: float = NCAP_STEP_KPH,
     **common: Any,
 ) -> list[EpisodeConfig]:
-    """Every case, policy and budget: 140 cases, 2,240 configurations a seed by default. `common`
-    are further fields of `EpisodeConfig`.
+    """Return every case, policy and budget: by default 140 cases, 2,240 configurations per seed.
+    `common` are further fields of `EpisodeConfig`.
     """
     # The cases are the protocols' own, which need no check: policies and budgets are checked once.
     cases = [case.parameters for case in ncap_cases(tests, step_kph)]
@@ -94,12 +94,12 @@ def r157_study(
     every: int = 1,
     driver: str = FIXED,
 ) -> list[EpisodeConfig]:
-    """The preventable cases of the grid, the kinds and sides in turn, or one of `every` of them,
-    under every policy and budget. `driver` is that of all.
+    """Return the preventable cases of the grid, kinds and sides in turn, or one of `every` of them,
+    under every policy and budget. `driver` is the driver of all.
     """
     cases = preventable(kinds_in_turn())
-    # By lot, the same at every call: kinds and sides come in turn, and every fifth case would be
-    # of nearly one kind.
+    # Drawn at random, the same at every call: kinds and sides come in turn, so every fifth case
+    # would be of nearly one kind.
     lot = np.random.default_rng(0).permutation(len(cases))
     some = [tuple(asdict(cases[number]).items()) for number in sorted(lot[::every].tolist())]
     # The cases are the grid's own, which need no check: policies and budgets are checked once.
@@ -107,5 +107,5 @@ def r157_study(
 
 
 def case_of(row: Row) -> CutInCase:
-    """The case that was played."""
+    """Return the case of a row."""
     return CutInCase(*(row[column] for column in CASE_COLUMNS))

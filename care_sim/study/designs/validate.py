@@ -1,7 +1,7 @@
-"""The validation of a world: everything that tells whether it discriminates between policies, for
+"""The validation of a world: everything that shows whether it discriminates between policies, for
 the world as it is and with one factor changed at a time.
 
-What is chosen is chosen on training seeds, and what is said is said of test seeds.
+Choices are made on training seeds, and results are of test seeds.
 """
 
 from collections.abc import Sequence
@@ -21,8 +21,8 @@ from care_sim.study.run_config import FULL, Row
 CAMERA_POLICIES = ("all-camera", "care", "care-sightlines", "care-sector")
 """The causal policies with a camera; the best of them has to beat the best control."""
 MEMORISER = "seed-finder"
-"""It looks the test seed up: what memory of who comes out can reach. Its figure is published, and
-it is nothing to beat.
+"""It looks the test seed up, and so shows what memory of hidden actors can reach. Its figure is
+published, but it is no reference to beat.
 """
 _BLIND = ("history", "random")
 
@@ -35,14 +35,14 @@ def validation_study(
     trained: int,
     **common: Any,
 ) -> list[EpisodeConfig]:
-    """Every level of a world: camera policies and controls on the first `trained` training seeds,
-    and all policies on the `test` seeds. The learned maps are of the same training seeds, without
-    the conditions. `common` are further fields of `EpisodeConfig`.
+    """Return every level of a world: camera policies and controls on the first `trained` training
+    seeds, and all policies on the `test` seeds. The learned maps come from the same training seeds,
+    without the conditions. `common` are further fields of `EpisodeConfig`.
 
-    Raises InvalidInput for a test seed that is no seed of the benchmark.
+    Raises InvalidInput for a test seed outside the benchmark.
     """
     check_benchmark_seeds(test)
-    # The memoriser may look up every seed below the validation's, and asks for what it knows first.
+    # The memoriser may look up every seed below the validation's, and demands known actors first.
     known = (
         ("learned-place.seeds", trained),
         ("history-learned-place.seeds", trained),
@@ -76,5 +76,5 @@ def levels_of(base: Parameters, factors: Sequence[Parameters]) -> list[Parameter
 
 
 def is_training(row: Row) -> bool:
-    """Whether an episode is of a training seed."""
+    """Return True if an episode has a training seed."""
     return int(row["seed"]) >= TRAINING

@@ -17,7 +17,7 @@ _Thing = TypeVar("_Thing")
 
 
 class Place(NamedTuple):
-    """A scenario, if need be with parameters, and a budget: where every level is played."""
+    """A scenario with optional parameters, and a budget, in which every level is played."""
 
     scenario: str
     budget: float
@@ -34,15 +34,15 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True)
 class Group:
-    """Places whose episodes are told together."""
+    """Places whose episodes are pooled."""
 
     name: str
     places: tuple[Place, ...]
 
 
 class FilmPlace(NamedTuple):
-    """A kind of source and a budget: where every level is played in the open loop. `shared` are
-    further columns of all its plays, as those of a sensor set-up.
+    """A kind of source and a budget, in which every level is played in the open loop. `shared` are
+    further columns of all its plays, such as those of a sensor set-up.
     """
 
     source: str
@@ -60,8 +60,8 @@ class FilmPlace(NamedTuple):
 
 @dataclass(frozen=True)
 class Variant:
-    """One level of what is varied: conditions that depart from the usual ones, or parameters of the
-    policy. Where the level is another policy, `policy` plays instead of the study's own.
+    """One level of a factor: conditions that differ from the defaults, or parameters of the policy.
+    If the level is another policy, `policy` plays instead of the study's own.
     """
 
     label: str
@@ -72,7 +72,9 @@ class Variant:
     def configurations(
         self, place: Place, policies: Iterable[str], seeds: Sequence[int]
     ) -> list[EpisodeConfig]:
-        """The episodes of this level; `full` runs once for all that it does not feel."""
+        """Return the episodes of this level; `full` runs once for all conditions that do not affect
+        it.
+        """
         played = [self.policy or policy for policy in policies]
         given = self._given() | {"scenario_parameters": place.parameters}
         return grid([place.scenario], played, [place.budget], seeds, **given)
@@ -85,7 +87,7 @@ class Variant:
         policies: Iterable[str],
         floor_seeds: Sequence[int] = (0,),
     ) -> list[PlayConfig]:
-        """The plays of this level in the open loop; `full` once likewise."""
+        """Return the plays of this level in the open loop; `full` also plays once."""
         played = [self.policy or policy for policy in policies]
         return play_grid(source, scenes, played, budgets, floor_seeds, **self._given())
 
@@ -96,7 +98,7 @@ class Variant:
     def key(self, place: Place | FilmPlace, policy: str) -> Key:
         """The cell of the rows of a policy at this level."""
         row = place.row() | {"policy": self.policy or policy} | dict(self.changes)
-        # The key of a row that has just these values: the same way in which rows get theirs.
+        # The key of a row with these values, made as for rows.
         setting, played, budget = key_of(row | flat("policy", tuple(self.parameters.items())))
         # The full scan was run once for all levels that it does not feel.
         return (setting.for_full(), FULL, 1.0) if policy == FULL else (setting, played, budget)
@@ -109,20 +111,20 @@ USUAL_VARIANT = Variant("usual")
 
 
 class TriedOut(NamedTuple, Generic[_Thing]):
-    """Things that can be played, and a line for each other thing."""
+    """Things that can be played, and a line for each of the others."""
 
     sound: list[_Thing]
     left_out: list[str]
 
 
-def tried_out(
+def keep_playable(
     things: Iterable[_Thing],
     tasks: Callable[[_Thing], Iterable[RunConfig]],
     where: str,
     label: Callable[[_Thing], str] = str,
 ) -> TriedOut[_Thing]:
-    """Return the `things` whose `tasks` can begin: a budget may buy no unit of a hardware, a set-up
-    not be divided by it, a recording not say what returned.
+    """Return the `things` whose `tasks` can begin. Reasons against it: a budget below one unit of
+    the hardware, a set-up that units do not divide, a recording without returns.
     """
     found = TriedOut[_Thing]([], [])
     for thing in things:

@@ -1,5 +1,5 @@
-"""The vehicle study (paper, Sec. 5.5): late evidence in turns, a camera that fails in mid-drive,
-and a pose that is not exact.
+"""The vehicle study (paper, Sec. 5.5): late evidence in turns, a camera that fails during the
+drive, and an inexact pose.
 """
 
 from collections.abc import Iterator, Sequence
@@ -41,11 +41,11 @@ EVIDENCE_LEVELS = (
     Variant("planned every 0.3 s", {"keyframe_s": 0.3}),
     Variant("planned every 0.3 s, 0.3 s late", {"keyframe_s": 0.3, "camera_latency": 1}),
 )
-"""How old pictures are and how often cells are chosen."""
+"""The age of pictures and the keyframe rate."""
 EVIDENCE_GROUPS = (TURNS, DRIVES)
 EVIDENCE_POLICIES = ("care", "history", "full")
 UNCOMPENSATED = {"yaw_compensation": False}
-"""CARE whose wedges stay where they were in the picture."""
+"""CARE with wedges that stay where they were in the picture."""
 
 
 def _blackouts(start_s: float, length_s: float) -> tuple[Variant, ...]:
@@ -86,7 +86,7 @@ FORGETTING = (
 
 
 PLAYED_IN_PART = ("care-sbf", "full", "all-camera")
-"""Policies that only some of the questions are asked of."""
+"""Policies that play only some of the questions."""
 
 
 def uncompensated(level: Variant) -> Variant:
@@ -100,7 +100,7 @@ def forgetting(level: Variant, rules: Variant) -> Variant:
 
 
 def is_late(level: Variant) -> bool:
-    """Whether the camera's evidence is old, without which there is nothing to compensate."""
+    """Return True if the camera's evidence is old; otherwise there is nothing to compensate."""
     return not level.changes.keys().isdisjoint(("camera_latency", "camera_latency_s"))
 
 
@@ -110,7 +110,7 @@ def vehicle_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[Episod
     """
     for policy in also:
         if policy in PLAYED_IN_PART:
-            # Its rows would stand among those that the study plays of it, and in no table.
+            # Its rows would mix with those that the study plays of it, and be in no table.
             raise InvalidInput(
                 f"the vehicle study plays {policy} itself where its tables show it; --also takes "
                 f"any policy but {', '.join(PLAYED_IN_PART)}"

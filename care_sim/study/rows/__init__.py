@@ -1,1 +1,1 @@
-"""Rows of a study: what their columns hold and mean, and their files."""
+"""Rows of a study: their columns and their files."""

@@ -1,5 +1,5 @@
-"""Checks of the rows of one folder, or of several that are merged: each task once and alike, one
-film and one world for all policies, every column known.
+"""Checks of the rows of one or several folders: each task once and equal, one film and one world
+for all policies, every column known.
 """
 
 from collections.abc import Iterable, Sequence
@@ -18,31 +18,31 @@ from care_sim.study.run_config import Row
 from care_sim.study.scene_play import DECISION_MS
 
 USUAL = DEFAULTS | {"presence": ANNOTATED}
-"""Parameters of a row that does not name them: rows of older versions lack what was added since."""
+"""Defaults of parameters that rows of older versions lack."""
 Task = frozenset[tuple[str, Any]]
 """The parameters of a task that are not the default, by name."""
 _LABEL_NAMES = ("scene", "scenario", "policy", "budget")
 _LABEL_SEEDS = ("seed", "floor_seed")
 _MAY_DIFFER = {
-    # Who played it and how fast.
+    # Columns of the code, the machine and the speed.
     *("version", "digest", "wall_s", "peak_rss_mb", *DECISION_MS),
-    # What was worked out beside the other rows of its folder.
+    # Columns computed from the other rows of the folder.
     *("tags", "regret_m", "censored", "differing_keyframes", "differing_cells"),
 }
-"""Columns that rows of one outcome may have differently."""
+"""Columns that may differ between rows of one outcome."""
 _MOST_NAMED = 5
-"""Unknown columns that a line names, at the most."""
+"""Most unknown columns that a line names."""
 
 
 def asked_with(row: Row) -> Row:
-    """The parameters of a row that differ from the defaults."""
+    """Return the parameters of a row that differ from the defaults."""
     asked = {
         name: value
         for name in _parameters(tuple(row))
         if (value := row[name]) is not None and value != USUAL.get(name)
     }
-    # A row holds the digest of a file of camera detections. It counts only whether one was given,
-    # so that the same command may replace its own rows after the file has changed.
+    # A row holds the digest of a file of camera detections. Only its presence counts, so that a
+    # command may replace its own rows after the file has changed.
     if "camera_detections" in asked:
         asked["camera_detections"] = True
     return asked
@@ -55,7 +55,7 @@ def _parameters(names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def identity(row: Row) -> Task:
-    """Equal for rows of one task, whatever code played it: what was asked for with them."""
+    """Return a key that is equal for rows of one task, for any code that played it."""
     return frozenset(asked_with(row).items())
 
 
@@ -76,14 +76,13 @@ class RowChecks:
         self._films: dict[object, tuple[Path, str]] = {}
 
     def is_new(self, row: Row, folder: Path) -> bool:
-        """Whether no row before had its task. Raises where one came out differently."""
+        """Return True for the first row of a task. Raises if an earlier row of the task differs."""
         if row.get("film_hash"):
             self._check_film(row, folder)
         before, other = self._rows.setdefault(identity(row), (folder, row))
         if other is row:
             return True
-        # A column that only one of them has was added between two versions. What is no number is
-        # equal to nothing, itself included.
+        # A column in only one row was added between two versions. NaN is not equal to itself.
         unlike = [
             name
             for name in other
@@ -101,7 +100,7 @@ class RowChecks:
         return False
 
     def unknown(self, columns: Sequence[str], schema: Schema) -> list[str]:
-        """A line where tables leave out `columns`, which this version does not know."""
+        """Return a line if tables leave out unknown `columns`."""
         known = {*schema.known(columns), *UNREAD}
         names = [name for name in columns if name not in known and not name.startswith("drawn.")]
         if not names:
@@ -116,7 +115,7 @@ class RowChecks:
         ]
 
     def _check_film(self, row: Row, folder: Path) -> None:
-        # How pulses return is a part of the film, and a condition.
+        # The return model is a part of the film, and a condition.
         place = setting_of(row), row["scene"]
         before, film = self._films.setdefault(place, (folder, row["film_hash"]))
         if film != row["film_hash"]:

@@ -1,5 +1,5 @@
-"""The parameters of a task: which values they may have, so that journals and columns of results
-give them back as they were. Options of commands read it, so that nothing heavy is imported here.
+"""The parameters of a task and their allowed values, which journals and columns of results restore
+exactly. Options of commands import this module, so it imports nothing heavy.
 """
 
 import ast
@@ -26,11 +26,10 @@ _LONGEST = 8192
 
 
 def checked_parameters(given: Iterable[tuple[str, Any]], whose: str) -> Parameters:
-    """The parameters with values of Python's own types, lists as tuples, paths as texts.
+    """Return the parameters with values of Python's own types, lists as tuples, paths as texts.
 
-    Raises InvalidInput for a value or a name that a journal and a column of a results file would
-    not give back: sets, maps, bytes, None, which a column reads as not given, NaN, halves of
-    characters, lists of several kinds.
+    Raises InvalidInput for values that journals and results files cannot restore: sets, maps,
+    bytes, None (a column's missing value), NaN, halves of characters, lists of mixed kinds.
     """
     name_of, value_of = f"the name of a {whose} parameter", f"{whose} parameter"
     return tuple(
@@ -55,7 +54,9 @@ def _column_value(value: Any) -> Any:
 
 
 def _plain(value: Any, levels: int = _DEEPEST) -> Any:
-    """The value in Python's own types. Raises ValueError or TypeError where it is not allowed."""
+    """Return the value in Python's own types. Raises ValueError or TypeError if it is not
+    allowed.
+    """
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
     if isinstance(value, list | tuple) and levels:
@@ -82,9 +83,7 @@ def _text(value: Any) -> str:
 
 
 def _kind(value: Any) -> Any:
-    """The kind of values that a column of such values holds. Raises ValueError for a list of
-    several kinds.
-    """
+    """Return the kind of a column of such values. Raises ValueError for a list of several kinds."""
     if not isinstance(value, tuple):
         # A column of numbers may mix whole ones with others.
         return float if type(value) is int else type(value)

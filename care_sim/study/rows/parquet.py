@@ -16,7 +16,7 @@ from care_sim.study.run_config import Row
 STUDY_NOTE = b"care_sim.study"
 """Key of the metadata that names the study of a file's rows."""
 LEFT_OUT_NOTE = b"care_sim.left_out"
-"""Key of the metadata that tells what is missing in a file."""
+"""Key of the metadata with a note on missing rows."""
 _ANY = Schema()
 """Columns of any name and type."""
 
@@ -28,8 +28,8 @@ def write_rows(
     left_out: Sequence[str] = (),
     schema: Schema = _ANY,
 ) -> None:
-    """Write rows, the name of their study and what it lacks to a Parquet file. A column in which no
-    row holds anything has the type that `schema` gives it.
+    """Write rows, the name of their study and its missing parts to a Parquet file. A column without
+    values has its type in `schema`.
     """
     # Rows may have different columns: parameters that only some policies have are None in the
     # others.
@@ -84,7 +84,7 @@ def check_columns(rows: Iterable[Row]) -> None:
 
 
 def with_tuples(row: Row) -> Row:
-    """The row with ranges as tuples again, which Parquet and JSON hold as lists."""
+    """Return the row with ranges as tuples, which Parquet and JSON hold as lists."""
     return {n: _with_tuples(v) if isinstance(v, list) else v for n, v in row.items()}
 
 
@@ -93,11 +93,11 @@ def _with_tuples(value: Any) -> Any:
 
 
 def read_rows(path: Path, schema: Schema | None = None) -> list[Row]:
-    """Read rows back; with a schema, the columns that it knows. Raises InvalidInput for a file that
-    is damaged, is empty, or does not have the schema.
+    """Read rows; with a schema, only its columns. Raises InvalidInput for a file that is damaged,
+    is empty, or does not have the schema.
     """
     table = read_table(path)
-    # The first fault is told.
+    # Report the first fault.
     for fault in (schema or _ANY).faults(table):
         raise InvalidInput(f"{path} holds no rows of a study: {fault}")
     known = table.select(schema.known(table.column_names)) if schema else table
@@ -110,7 +110,7 @@ def read_rows(path: Path, schema: Schema | None = None) -> list[Row]:
 
 
 def read_notes(path: Path) -> tuple[str | None, list[str]]:
-    """The name of the study that wrote a file, None without one, and what it left out. Raises
+    """Return the name of a file's study, None without one, and its missing parts. Raises
     InvalidInput for a damaged file, or other notes.
     """
     notes = read_table(path).schema.metadata or {}
@@ -127,7 +127,7 @@ def read_notes(path: Path) -> tuple[str | None, list[str]]:
 
 
 def read_table(path: Path) -> pa.Table:
-    """The table of a file as it is. Raises InvalidInput where there is none, or a damaged one."""
+    """Return the table of a file as it is. Raises InvalidInput for a missing or damaged file."""
     if not path.is_file():
         raise InvalidInput(f"no results at {path}; expected a folder that a study wrote")
     try:

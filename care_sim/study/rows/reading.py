@@ -1,8 +1,8 @@
 """Readings of rows: their setting, their policy, and in the closed loop their first detection.
 
-Rows of one world under the same conditions may be compared and form a `Setting`, in the closed and
-in the open loop; in it, the rows of a policy at a budget form a cell. Some columns are added when a
-study is written: what only rows side by side, or the policies, tell.
+Rows of one world under the same conditions can be compared and form a `Setting`, in the closed and
+in the open loop. In a setting, the rows of a policy at a budget form a cell. Some columns are added
+when a study is written: they need several rows, or the policies.
 """
 
 from collections.abc import Sequence
@@ -28,18 +28,18 @@ SOURCES = {
     "kitti": "KITTI",
     "boreas": "Boreas",
 }
-"""How headings name the sources of films."""
+"""Names of film sources in headings."""
 WITHOUT_LABELS = "sweeps"
 """The source that a detector annotates."""
 
 
 @dataclass(frozen=True, order=True)
 class Setting:
-    """Where rows were played, and the conditions in which they depart from the defaults.
+    """The world of rows, and their conditions other than the defaults.
 
     `world` is a scenario in the closed loop and a source of films in the open loop. `detector` is
-    that of the open loop with its parameters, empty in the closed loop, where another than the
-    default is among the conditions.
+    that of the open loop with its parameters. It is empty in the closed loop, where a non-default
+    detector is a condition.
     """
 
     world: str
@@ -48,28 +48,28 @@ class Setting:
 
     @property
     def faults(self) -> bool:
-        """Whether the camera is impaired."""
+        """True if the camera is impaired."""
         return any(name in CAMERA_FAULTS for name, _ in self.conditions)
 
     @property
     def strict_causal(self) -> bool:
-        """Whether it is the paper's strict-causal variant (Sec. 3): the camera one keyframe old.
+        """True for the paper's strict-causal variant (Sec. 3): the camera one keyframe old.
 
-        The paper defines it in the open loop alone.
+        The paper defines it only in the open loop.
         """
         # Only the open loop has a detector here.
         return bool(self.detector) and self.conditions == (("camera_latency", 1),)
 
     @property
     def has_paper(self) -> bool:
-        """Whether the paper's figures stand beside those of these films: of generated streets and
-        recordings, not of a source of one's own, of which it says nothing.
+        """True if the paper's figures apply to these films: generated streets and recordings, but
+        not a user's source.
         """
         return self.world in SOURCES
 
     @property
     def as_in_paper(self) -> bool:
-        """Whether these are films beside which its figures stand, under the default conditions."""
+        """True if the paper's figures apply and all conditions are defaults."""
         return self.has_paper and not self.conditions
 
     @property
@@ -90,11 +90,11 @@ class Setting:
         detector = [] if self.detector in ("", PROXY) else [self.detector]
         changed = [f"{name}-{value}" for name, value in self.conditions]
         text = "-".join([self.world, *detector, *changed])
-        # Every other sign may mean something to a file system or a shell.
+        # Other characters may have a meaning for a file system or a shell.
         return "".join(sign if sign.isalnum() or sign in ".-" else "-" for sign in text)
 
     def for_full(self) -> "Setting":
-        """The setting in which the full scan of the same world is found."""
+        """Return the setting of the full scan of the same world."""
         felt = (pair for pair in self.conditions if pair[0] not in UNUSED_BY_FULL_SCAN)
         return replace(self, conditions=tuple(felt))
 
@@ -110,7 +110,7 @@ READ_WITH = {
     "reference": CLUSTER,
     "topics": None,
 }
-"""Columns that tell how a recording is read, and what they hold where it is the usual way."""
+"""Columns of the reading of a recording, and their usual values."""
 _USUAL_PLAY = (
     {name: DEFAULTS[name] for name in OF_BOTH_LOOPS if name != "floor_seed"}
     | READ_WITH
@@ -137,13 +137,13 @@ def _setting_columns(names: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(n for n in names if n in _OF_A_SETTING or n.startswith(("scenario.", "detector.")))
 
 
-# Typed, since 1, 1.0 and True are equal and not written the same.
+# Typed, since 1, 1.0 and True are equal but written differently.
 @lru_cache(typed=True)
 def _setting_with(names: tuple[str, ...], *values: Any) -> Setting:
     """Return the setting of rows that hold these values."""
     row = dict(zip(names, values, strict=True))
-    # Parameters of a scenario have no default in _USUAL_EPISODE: one that was given names another
-    # setting, whatever its value.
+    # Parameters of a scenario have no default in _USUAL_EPISODE: a given one makes another setting,
+    # for any value.
     changed = [
         (n, value)
         for n, value in row.items()
@@ -151,7 +151,7 @@ def _setting_with(names: tuple[str, ...], *values: Any) -> Setting:
         and value is not None
         and value != _USUAL_EPISODE.get(n)
     ]
-    # Sorted, so that the order of columns in a file does not make another setting.
+    # Sorted, so that the order of columns in a file does not matter.
     conditions = sorted((n.removeprefix("scenario."), v) for n, v in changed)
     conditions += _sensor(row)
     if row.get("keyframe_s") is not None:
@@ -173,8 +173,8 @@ def _setting_of_play(row: Row) -> Setting:
 
 
 def _sensor(row: Row) -> list[tuple[str, Any]]:
-    """Another sensor set-up than the default, as a condition. Files of one name may differ: the
-    begin of the hash tells them apart.
+    """Return a non-default sensor set-up, as a condition. Files of one name may differ, so the
+    beginning of the hash is included.
     """
     if row.get("sensor") is None:
         return []
@@ -183,7 +183,7 @@ def _sensor(row: Row) -> list[tuple[str, Any]]:
 
 
 def key_of(row: Row) -> Key:
-    """The cell a row belongs to."""
+    """Return the cell of a row."""
     return setting_of(row), policy_of(row), row["budget"]
 
 
@@ -193,9 +193,7 @@ def policy_of(row: Row) -> str:
 
 
 def with_parameters(row: Row, kind: str) -> str:
-    """The name in the column `kind`, with the parameters in the columns whose names begin with it
-    and a dot.
-    """
+    """Return the name in the column `kind`, with the parameters in the columns `kind.NAME`."""
     given = [(name, row[name]) for name in _parameter_columns(tuple(row), f"{kind}.")]
     return " ".join(
         [
@@ -215,7 +213,7 @@ def _parameter_columns(names: tuple[str, ...], prefix: str) -> tuple[str, ...]:
 
 
 def _text(value: Any) -> str:
-    """Written the same for a number that was an int before a file held it as a float."""
+    """Written the same for an int and for the float that a file holds."""
     return f"{value:g}" if is_number(value) else f"{value}"
 
 
@@ -233,10 +231,10 @@ def grouped(rows: Sequence[Row]) -> dict[Key, list[Row]]:
 
 
 def detection(row: Row) -> Reading | None:
-    """Detection distance in metres; of an actor never detected, the most it can have been. None of
-    an episode without a first-sighting actor: a drive that meets nobody.
+    """Return the detection distance in metres, for an undetected actor its upper bound. None for an
+    episode without a first-sighting actor.
 
-    A detection after a stop for nothing does not count: the distance is the most it can have been.
+    A detection after a needless stop does not count: the distance is then the upper bound.
     """
     distance = row["detection_distance_m"]
     if distance is not None:
@@ -251,30 +249,30 @@ def detections(rows: Sequence[Row]) -> list[Reading]:
 
 
 def is_missed(row: Row) -> bool:
-    """Whether there was a first-sighting actor who was never detected."""
+    """Return True if there was a first-sighting actor that was never detected."""
     found = detection(row)
     return found is not None and found.censored
 
 
 def stops_for_nothing(row: Row) -> bool:
-    """Whether the car braked for what its detector made up, before the actor was in view. Older
+    """Return True if the car braked for a false detection, before the actor was in view. Older
     files, and plays of the open loop, lack the column.
     """
     return bool(row.get("braked_before_view"))
 
 
 def is_avoided(row: Row) -> bool:
-    """Whether the car avoids the collision. A stop for nothing avoids none."""
+    """Return True if the car avoids the collision. A needless stop avoids none."""
     return not (row["collision"] or stops_for_nothing(row))
 
 
 def spared_seeds(full: Sequence[Row]) -> set[int]:
-    """The seeds on which the full scan avoids the collision."""
+    """Return the seeds on which the full scan avoids the collision."""
     return {row["seed"] for row in full if is_avoided(row)}
 
 
 def preventable(full: Sequence[Row], rows: Sequence[Row]) -> list[Row]:
-    """The rows of the seeds on which the full scan avoids the collision."""
+    """Return the rows of the seeds on which the full scan avoids the collision."""
     spared = spared_seeds(full)
     return [row for row in rows if row["seed"] in spared]
 
@@ -283,19 +281,19 @@ _FullScans = dict[tuple[Setting, int], Row]
 
 
 def with_added_columns(rows: Sequence[Row]) -> list[Row]:
-    """The rows with three more columns: `tags` of the policy, joined by '+', and those of
+    """Return the rows with three more columns: `tags` of the policy, joined by '+', and those of
     `with_regret`.
     """
     return with_regret(with_tags(rows))
 
 
 def with_regret(rows: Sequence[Row]) -> list[Row]:
-    """The rows with two more columns, made anew where they are there.
+    """Return the rows with two more columns, which replace existing ones.
 
-    `regret_m`: detection distance of the full scan of the same world and seed minus that of this
-    row, 0 at best, None where the full scan was not run and where nobody is met.
-    `censored`: the policy, or that full scan, never detected the actor, so that `regret_m` takes
-    the most that its distance can have been and is a bound.
+    `regret_m` is the detection distance of the full scan in the same world and seed minus that of
+    this row, 0 at best. It is None without a full scan or an actor. `censored` is True if the
+    policy or the full scan never detected the actor. Then `regret_m` uses the upper bound of a
+    distance and is a bound.
     """
     full = {(setting_of(row), row["seed"]): row for row in rows if row["policy"] == "full"}
     return [{**row, **_regret(row, full)} for row in rows]

@@ -1,5 +1,5 @@
-"""Schema of the columns of results, so that every report can be made of them. Columns are checked
-when a file is opened.
+"""Schema of the columns of results, which every report relies on. Columns are checked when a file
+is opened.
 """
 
 import math
@@ -14,7 +14,7 @@ from care_sim.core.conditions import DEFAULTS
 _LARGEST = 1e12
 """The largest size of a measured number that can still be averaged and drawn."""
 PARAMETERS = ("scenario.", "policy.", "detector.")
-"""What the names of columns of parameters begin with."""
+"""Prefixes of parameter columns."""
 
 
 def _is_text(kind: pa.DataType) -> bool:
@@ -56,8 +56,7 @@ _WRITTEN = {"text": pa.string(), "true or false": pa.bool_(), "whole numbers": p
 class Column:
     """A column of one of `_KINDS`, its numbers between `least` and `most`.
 
-    Where it is `optional`, rows may hold nothing in it. Numbers that are `whole` count something,
-    whatever type a file holds them in.
+    An `optional` column may be empty in rows. `whole` numbers may have any type in a file.
     """
 
     kind: str
@@ -74,8 +73,8 @@ class Column:
     def faults(self, values: pa.ChunkedArray) -> Iterator[str]:
         """Yield the faults of a file's values."""
         if self.optional and values.null_count == len(values):
-            # The type of an empty column carries no meaning: pandas and earlier versions write
-            # numbers there.
+            # The type of an empty column has no meaning: pandas and earlier versions write numbers
+            # there.
             return
         if not _KINDS[self.kind](values.type):
             yield f"must hold {self.kind}, got {values.type}"
@@ -92,7 +91,7 @@ class Column:
                 yield "must hold whole lists, got lists with gaps"
         if not _is_number(values.type) or self.kind == _ANY:
             return
-        # Without any number, in lists that are all empty, the ends are None, and so is `finite`.
+        # Without any number, as in empty lists, the ends and `finite` are None.
         ends = pc.min_max(values).as_py()
         lowest = ends["min"]
         highest = ends["max"]
@@ -110,10 +109,10 @@ FLAG = Column("true or false")
 COUNT = Column("whole numbers", least=0)
 SEED = Column("whole numbers", least=0, most=math.inf)
 MEASURE = Column("numbers")
-"""What may be below 0, as the distance of hulls that overlap."""
+"""Numbers that may be below 0, such as the distance of overlapping hulls."""
 SUM = Column("numbers", least=0)
 TALLY = Column("numbers", least=0, whole=True)
-"""Events and frames, and how many of them: numerators and denominators of the ratios in tables."""
+"""Counts of events and frames: numerators and denominators of the ratios in tables."""
 SHARE = Column("numbers", least=1e-9, most=1)
 PARAMETER = Column(_ANY, optional=True)
 _OF_TYPES = {
@@ -129,7 +128,7 @@ CONDITION_COLUMNS = {
 
 
 def as_optional(column: Column) -> Column:
-    """The same where rows may hold nothing."""
+    """Return the columns as optional ones."""
     return replace(column, optional=True)
 
 
@@ -137,10 +136,10 @@ def as_optional(column: Column) -> Column:
 class Schema:
     """The columns of a kind of results.
 
-    Those that are `needed`; `further` ones that are checked where they are; `sums`, which come
-    again for every stratum as KIND/STRATUM/NAME, all of them or none. Columns of parameters are
-    known too. All others are not read. A number in a column of `parts` is at most the number in
-    the column that it names, in every stratum too.
+    `needed` columns are required; `further` ones are checked if present. `sums` repeat for every
+    stratum as KIND/STRATUM/NAME, all of them or none. Columns of parameters are also known. All
+    others are ignored. A number in a column of `parts` is at most the number in the column that it
+    names, also in every stratum.
     """
 
     needed: Mapping[str, Column] = field(default_factory=dict)
@@ -179,17 +178,17 @@ class Schema:
 
     @property
     def lenient(self) -> "Schema":
-        """The same where nothing is needed, for results that an older version wrote."""
+        """Return the schema without required columns, for results of an older version."""
         return Schema({}, {**self.needed, **self.further})
 
     def column(self, name: str) -> Column:
-        """Return the rule for a column; a sum of a stratum, where nothing else is said."""
+        """Return the rule for a column, by default that of a stratum's sum."""
         if name.startswith(PARAMETERS):
             return {**self.further, **self.needed}.get(name, PARAMETER)
         return {**self.further, **self.needed}.get(name, TALLY)
 
     def _strata(self, names: Sequence[str]) -> set[str]:
-        """All columns of the strata of which one is there."""
+        """Return all columns of the strata that have at least one."""
         parts = (name.split("/") for name in names)
         strata = {
             (kind, label)

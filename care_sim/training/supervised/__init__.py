@@ -1,1 +1,1 @@
-"""Training on truth: what cells, boxes and tracks would have found, and where bodies stood."""
+"""Training on truth: detections of cells, boxes and tracks, and the places of bodies."""

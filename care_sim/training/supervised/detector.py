@@ -55,11 +55,11 @@ if TYPE_CHECKING:
     from care_sim.training.supervised.detector_network import Learning
 
 PLAIN: Floats = np.tile([1.0, 0.0], (len(CLASSES), 1))
-"""The calibration that leaves every logit as it is."""
+"""The identity calibration."""
 LEAST_LOGIT = -6.0
-"""Peaks below are not looked at: an object in four hundred, or fewer."""
+"""Lower peaks are ignored: at most one in four hundred is an object."""
 FEWEST_HITS = 20
-"""Of a class, to fit its scores to."""
+"""Fewest peaks of a class to fit its scores to."""
 NEWTON_STEPS = 30
 RIDGE = 1e-3
 """Keeps the fit finite where all peaks above some logit are right."""
@@ -67,35 +67,34 @@ RIDGE = 1e-3
 BATCH = 4
 """Scans per gradient."""
 LEARNING_RATE = 2e-3
-"""Of AdamW, at its highest."""
+"""Highest rate of AdamW."""
 WEIGHT_DECAY = 0.01
 STEEPEST = 10.0
 """The longest gradient; longer ones are shortened to it."""
 SHUFFLED = 512
-"""Examples from which a batch is drawn: those of some twenty plays, so that a batch holds several
-streets."""
+"""Examples from which a batch is drawn: about twenty plays, so that a batch holds several
+streets.
+"""
 FIRST_BATCHES = 4
-"""Over which layers are normalised that learn on from weights."""
+"""Examples to normalise layers that continue from weights."""
 AHEAD = 4
-"""Plays that are under way before they are needed."""
+"""Plays that run ahead."""
 RISING = 0.05
 """Share of the steps in which the rate of learning rises."""
 CURVE_STEPS = 250
-"""Steps between two points of the curve that the card tells, after which the weights are written,
-too."""
+"""Steps between two points of the card's curve; the weights are also written then."""
 CALIBRATING = range(VALIDATION, VALIDATION + 24)
 HELD_OUT = range(VALIDATION + 24, VALIDATION + 48)
-"""Seeds of plays that nothing is learned from: those that scores are fitted to, and those by which
-the card tells what was reached."""
+"""Seeds of held-out plays: for fitting scores, and for the card's results."""
 LEAST_CHECKED = 8
-"""Scenes of a source that are played for either, the same again where there are fewer: 24 plays."""
+"""Plays of a source's scenes for each part, repeated if there are fewer scenes: 24."""
 CHECKED_CLUTTERED = 8
-"""Plays of cluttered streets of either kind: each has three times the examples of others."""
+"""Plays of cluttered streets for each part: each has three times the examples of others."""
 
 
 def train_pillars(config: DetectorConfig, scenes: Scenes | None = None) -> int:
-    """Train the detector, on `scenes` if there are some, and write its weights; returns the exit
-    code of the command.
+    """Train the detector, on `scenes` if given, write its weights, and return the exit code of the
+    command.
     """
     torch = import_torch()
     from care_sim.training.supervised.detector_network import Learning
@@ -116,7 +115,7 @@ def train_pillars(config: DetectorConfig, scenes: Scenes | None = None) -> int:
 
     def keep(losses: list[float]) -> None:
         nonlocal kept
-        # Whatever ends the learning, or the check of it, what was learned until then is kept.
+        # The weights learned so far are kept, whatever ends the learning or its check.
         if len(losses) % CURVE_STEPS == 0 or len(losses) == config.steps:
             save(losses)
             kept = len(losses)
@@ -143,9 +142,7 @@ def _learned(
     network: "Learning",
     keep: Callable[[list[float]], None],
 ) -> tuple[list[float], Floats, dict[str, float]]:
-    """Let the network learn and check it: its losses, its calibration, and what it reaches on plays
-    apart.
-    """
+    """Train the network and check it: losses, calibration, and results on held-out plays."""
     start = None if config.start is None else load_detector(config.start)[0]
     with one_thread(import_torch()), _player() as executor:
         print_lines(f"playing {SHUFFLED} scans before the first step", file=sys.stderr)
@@ -178,21 +175,21 @@ def _generated_worlds(config: DetectorConfig, seeds: Iterable[int]) -> Iterator[
 
 
 def _held_out(scenes: Scenes) -> tuple[Sequence[World], Sequence[World]]:
-    """Plays that scores are fitted to, and those that are judged. A single scene is both, in other
-    plays.
+    """Return plays for fitting scores, and plays for the results. A single scene serves both, in
+    different plays.
     """
     fitted, apart = scenes.held_out[::2], scenes.held_out[1::2] or scenes.held_out
     return _repeated(scenes, fitted, 0), _repeated(scenes, apart, LEAST_CHECKED)
 
 
 def _checked(config: DetectorConfig) -> tuple[range, range]:
-    """Seeds of the generated plays that scores are fitted to, and of those held out."""
+    """Return the seeds of generated plays for fitting scores, and of those held out."""
     many = CHECKED_CLUTTERED if config.clutter else len(CALIBRATING)
     return CALIBRATING[:many], HELD_OUT[:many]
 
 
 def _repeated(scenes: Scenes, part: Sequence[Scene], first: int) -> list[World]:
-    """The worlds of a part, played in as many turns as make enough of them."""
+    """Return the worlds of a part, repeated in turns until there are enough."""
     turns = range(first, first - (-LEAST_CHECKED // len(part)))
     return [world for turn in turns for world in scenes.worlds(part, turn)]
 
@@ -203,7 +200,7 @@ def train_detector(
     steps: int,
     after: Callable[[list[float]], None] = lambda _losses: None,
 ) -> list[float]:
-    """Let the network learn from so many batches; see `care_sim.training.supervised.fit.fit`."""
+    """Train the network on this many batches; see `care_sim.training.supervised.fit.fit`."""
     torch = import_torch()
     network.train()
     optimizer = torch.optim.AdamW(network.parameters(), lr=LEARNING_RATE, weight_decay=WEIGHT_DECAY)
@@ -212,8 +209,8 @@ def train_detector(
         torch.nn.utils.clip_grad_norm_(network.parameters(), STEEPEST)
 
     optimizer.register_step_pre_hook(shorten)
-    # Of so few steps that the rate would rise in one at most it rises in none: PyTorch divides by
-    # the steps after the first in which it does.
+    # With so few steps that the rate would rise in at most one, it rises in none: PyTorch divides
+    # by the number of rising steps minus one.
     rising = RISING if RISING * steps > 1 else 0.0
     schedule = torch.optim.lr_scheduler.OneCycleLR(
         optimizer, LEARNING_RATE, total_steps=steps, pct_start=rising, cycle_momentum=False
@@ -226,7 +223,7 @@ def train_detector(
 
 
 def played(executor: Executor, worlds: Iterator[World]) -> Iterator[Example]:
-    """The examples of the plays of endless `worlds`, in order."""
+    """Yield the examples of the plays of endless `worlds`, in order."""
     under_way = deque(executor.submit(play, one) for one in islice(worlds, AHEAD))
     for world in worlds:
         examples = under_way.popleft().result()
@@ -236,8 +233,8 @@ def played(executor: Executor, worlds: Iterator[World]) -> Iterator[Example]:
 
 @contextmanager
 def _player() -> Iterator[Executor]:
-    """One process that plays. What it is still at when all is learned, or when the learning is
-    broken off, nobody waits for.
+    """Yield a process that plays. Its remaining work is dropped when learning ends or is
+    interrupted.
     """
     executor = processes(1)
     try:
@@ -249,7 +246,7 @@ def _player() -> Iterator[Executor]:
 
 
 def _batches(examples: Iterator[Example], rng: np.random.Generator) -> Iterator[list[Example]]:
-    """Batches of examples, turned, each drawn from SHUFFLED that wait, whose places others take."""
+    """Yield batches of rotated examples, drawn from a buffer of SHUFFLED that is refilled."""
     waiting = [*islice(examples, SHUFFLED)]
     while True:
         batch = []
@@ -266,7 +263,7 @@ def _card(
     losses: list[float],
     result: dict[str, float] | None,
 ) -> dict[str, Any]:
-    """Return the card of the file; without a `result` nobody has checked the weights."""
+    """Return the card of the file; without a `result` the weights are unchecked."""
     numbers = sum(array.size for array in network.arrays().values())
     parts = [losses[n : n + CURVE_STEPS] for n in range(0, len(losses), CURVE_STEPS)]
     told = scenes.told if scenes else _generated(made)
@@ -304,8 +301,8 @@ def _generated(made: DetectorConfig) -> dict[str, Any]:
 
 
 class Judged(NamedTuple):
-    """The peaks of a scan, `right` (n,) those that serve an object, and how many `objects` with
-    a return stood on the plan; `full` says that every cell fired.
+    """The peaks of a scan. `right` (n,) marks matched ones, `objects` counts objects with a return
+    on the plan, `full` is True if every cell fired.
     """
 
     peaks: Peaks
@@ -330,7 +327,9 @@ def scores_by_scan(
 
 
 def right(peaks: Peaks, example: Example) -> Mask:
-    """(n,) which peaks lie within 2 m of an object of their class that no surer one serves."""
+    """Return (n,) which peaks lie within 2 m of an object of their class that no surer peak
+    matches.
+    """
     there = Annotations(np.arange(len(example.classes)), example.classes, example.boxes)
     many = np.ones(len(peaks.classes), np.int64)
     server = served_by(there, Detections(peaks.classes, peaks.boxes, many, peaks.scores))
@@ -340,8 +339,8 @@ def right(peaks: Peaks, example: Example) -> Mask:
 
 
 def calibration_of(scans: list[Judged]) -> Floats:
-    """(classes, 2) slope and offset, by class, that make the score of a peak its chance to be
-    right: the logistic regression of Platt (1999). A class with too few keeps its logits.
+    """Return (classes, 2) slope and offset per class that turn a peak's score into its chance to be
+    right, by the logistic regression of Platt (1999). A class with too few peaks keeps its logits.
     """
     classes, logits = (
         np.concatenate([column[n] for column in (scan.peaks for scan in scans)]) for n in (0, 1)
@@ -357,8 +356,8 @@ def calibration_of(scans: list[Judged]) -> Floats:
 
 
 def judged(scans: list[Judged]) -> dict[str, float]:
-    """Recall and precision of all and of full scans at the score that is reported by default, and
-    the mean distance of scores from the share that is right, over tenths.
+    """Return recall and precision of all and of full scans at the default score, and the
+    calibration error over tenths of scores.
     """
     told: dict[str, float] = {}
     for name, some in (("all scans", scans), ("full scans", [one for one in scans if one.full])):
@@ -375,7 +374,7 @@ def judged(scans: list[Judged]) -> dict[str, float]:
 
 
 def _fitted(logits: Floats, hits: Mask) -> Floats:
-    """Slope and offset by Newton's method."""
+    """Fit slope and offset by Newton's method."""
     design = np.column_stack([logits, np.ones(len(logits))])
     line = np.array([1.0, 0.0])
     for _ in range(NEWTON_STEPS):

@@ -3,23 +3,20 @@ source, and the objects in them.
 
 Truth is used here, at training, and nowhere else.
 
-- A play is one street or one drive under one seed. Policies play it at budgets, all drawn; an
-  example is a keyframe of it. What a detector would be handed is what the observation holds: the
-  ranges of the cells that fired.
+- A play is one street or one drive under one seed. Policies and budgets are drawn; an example is a
+  keyframe. The detector's input is in the observation: the ranges of the fired cells.
 - A quarter of the plays fire every cell. The budgets of the others are drawn evenly by their
   logarithm: a scan of a hundredth differs from one of a tenth as that does from the whole.
 - Noise of ranges and lost returns are drawn for every play. Streets have the default set-up, since
-  a film casts every cell of every keyframe; of drives half have another one.
-- Policies track what they find by the paper's proxy. So what they aim at does not hang on a
-  detector that is still to be trained.
-- Of a source every play is one of its scenes. An example is then the points that `pillars` would
-  be handed: recorded ones where they were measured, up to the reach of the grid; without recorded
-  sweeps those of rays cast at the boxes.
-- An object counts from one return on. What has none cannot be told from nothing.
+  a film casts every cell of every keyframe; half of the drives have another one.
+- Policies track by the paper's proxy. So their aim does not depend on a detector that is still to
+  be trained.
+- Plays of a source are its scenes. An example is then the input of `pillars`: recorded points up to
+  the reach of the grid, or, without recorded sweeps, rays cast at the boxes.
+- An object counts from one return on, since an object without returns is invisible.
 
-What the network should answer, and by how much its answer is off, follows CenterPoint (Yin, Zhou,
-Kraehenbuehl 2021, Sec. 4): a focal loss that forgives answers near a centre, and absolute
-differences of what is told of the box.
+Targets and loss follow CenterPoint (Yin, Zhou, Kraehenbuehl 2021, Sec. 4): a focal loss that
+tolerates outputs near a centre, and absolute differences of box values.
 """
 
 from collections.abc import Callable, Iterator
@@ -52,42 +49,45 @@ POLICIES = (
     "care-priority", "care-sbf", "care-spread", "care-sightlines", "care-sector", "care-units",
     "rows", "fan", "stride", "sweep", "history-rows",
 )  # fmt: skip
-"""Those that come with the package and know any grid."""
+"""Shipped policies that fit any grid."""
 EITHER, CLUTTERED = "street or drive", "cluttered street"
 """Kinds of generated worlds."""
 LEAST_BUDGET, MOST_BUDGET = 0.01, 0.6
 FULL_SHARE, FULL_SHARE_CLUTTERED = 0.25, 0.5
-"""Of plays in which every cell fires. Those of cluttered streets are for recorded sweeps, too,
-which are full.
+"""Share of plays in which every cell fires. Larger on cluttered streets, which also serve recorded
+sweeps, which are full.
 """
 RANGE_SIGMAS_M = (0.0, 0.02, 0.05)
 DROPOUTS = (0.0, 0.05, 0.2)
 OTHER_SETUPS = ("m1-forward", "os1-64", "paper-vehicle", "roof-and-corners")
 RECORDED_SETUPS = ("nuscenes", "argoverse-2")
-"""Of cluttered streets a quarter is seen by each of these, as densely as recorded sweeps are; a
-quarter by the default set-up and a quarter by others."""
+"""Each of these set-ups sees a quarter of the cluttered streets, as densely as recorded sweeps. The
+default set-up sees a quarter, others a quarter.
+"""
 PLAYS_OF_FILM = 3
 """Plays for which a film is made once."""
 SHARE_KEPT = 1 / 3
-"""Of the keyframes of a play, drawn, that become examples: neighbours resemble each other."""
+"""Share of a play's keyframes that become examples: neighbours resemble each other."""
 RARE = (CLASSES.index("bus"), CLASSES.index("bicycle"))
-"""Of the objects of the streets under 1 and 3 in a hundred: a keyframe with a return of one
-always becomes an example."""
+"""Rare classes, under 1% and 3% of the streets' objects: a keyframe with a return of one always
+becomes an example.
+"""
 MOST_TURN = 0.4
-"""Radians by which a scan is turned for the learning, either way; every second one is mirrored,
-too. Generated streets are mostly straight."""
+"""Largest rotation of a scan in training, either way, radians; every second scan is also mirrored.
+Generated streets are mostly straight.
+"""
 DRIVE_KEYFRAME_S = 0.5
-"""As far apart as those of a street."""
+"""Seconds between keyframes, as on a street."""
 _ROUND_BOX_M = 0.2
-"""A box is taken so much larger on either side for its returns: noise of ranges."""
+"""Margin of a box on either side for its returns: noise of ranges."""
 _NO_RETURN_M = 1e-3
-"""A range this near to the reach is none."""
+"""A range this near to the reach is no return."""
 
 
 @dataclass(frozen=True)
 class Example:
-    """A scan and what stands in it: `points` (P, 3) in the sensor frame, `classes` (n,), `boxes`
-    (n, 7); all objects within the plan that have a return. `full` says that every cell fired.
+    """A scan and its objects: `points` (P, 3) in the sensor frame, `classes` (n,) and `boxes` (n,
+    7) of all objects on the plan with a return. `full` is True if every cell fired.
     """
 
     points: NDArray[np.float32]
@@ -98,12 +98,12 @@ class Example:
 
 
 def play(world: World) -> list[Example]:
-    """The examples of a world: of a `CLUTTERED` street, of `EITHER` a street or a drive, as the
-    seed draws it, or of the scene of a source.
+    """Yield the examples of a world: a `CLUTTERED` street, `EITHER` a street or a drive as the seed
+    draws, or a source's scene.
     """
     rng = np.random.default_rng([world.seed, 21])
     if world.film:
-        return [*_film(world.film(), world.seed, rng, _handed)]
+        return [*_film(world.film(), world.seed, rng, _detector_input)]
     if world.kind == CLUTTERED:
         return [*_street(world.seed, rng, clutter=True)]
     # Drawn, since the layouts of streets come in turn.
@@ -119,7 +119,7 @@ def _street(seed: int, rng: np.random.Generator, clutter: bool = False) -> Itera
 def _film(
     film: Film, seed: int, rng: np.random.Generator, look: "_Look", clutter: bool = False
 ) -> Iterator[Example]:
-    # After the last keyframe nobody looks, so its ranges are in no observation.
+    # No observation follows the last keyframe, so its ranges are missing.
     keyframes = len(film.shots) - 1
     for _ in range(PLAYS_OF_FILM):
         with closing(FilmEnv(film, clutter=clutter, **_conditions(rng, clutter))) as env:
@@ -161,7 +161,7 @@ def _examples(
     observation, _ = env.reset(seed=seed)
     policy.reset()
     for _ in range(keyframes):
-        # The truth of the scan is that of the time before the step, which moves the world on.
+        # The truth of the scan is that before the step, which advances the world.
         present = _present(env)
         observation, _, terminated, truncated, _ = env.step(policy(observation))
         example = look(env, observation, present, full)
@@ -172,8 +172,9 @@ def _examples(
 
 
 _Look = Callable[[Any, Any, Annotations, bool], Example]
-"""Makes an example of an environment after a step: of its observation, what was present, and
-whether every cell fired."""
+"""Makes an example after a step, from the environment, its observation, the present objects, and
+whether every cell fired.
+"""
 
 
 def _by_ranges(env: AnyEnv, observation: Any, present: Annotations, full: bool) -> Example:
@@ -181,9 +182,9 @@ def _by_ranges(env: AnyEnv, observation: Any, present: Annotations, full: bool) 
     return _example(points, env.rig.sensor_height_m, present, full)
 
 
-def _handed(env: FilmEnv, _: Any, present: Annotations, full: bool) -> Example:
-    """Return what the detector received: points where they were measured, of all sweeps that the
-    source gathers. The source says on whom they lie: a real road is not level.
+def _detector_input(env: FilmEnv, _: Any, present: Annotations, full: bool) -> Example:
+    """Return the detector's input: measured points of all gathered sweeps. The source gives the
+    object of each point, since a real road is not level.
     """
     cloud = env.loop.handed
     seen = np.isin(present.objects, cloud.objects) & within_plan(present.boxes)
@@ -193,7 +194,7 @@ def _handed(env: FilmEnv, _: Any, present: Annotations, full: bool) -> Example:
 
 
 def _present(env: AnyEnv) -> Annotations:
-    """Everything that perception reports, at the coming keyframe."""
+    """Return all objects that perception reports, at the next keyframe."""
     if isinstance(env, FilmEnv):
         return env.loop.shot.annotations
     world, sensor = env.loop.world, env.loop.sensor
@@ -204,8 +205,8 @@ def _present(env: AnyEnv) -> Annotations:
 
 
 def scanned(grid: Grid, ranges: NDArray[np.float32]) -> Floats:
-    """(P, 3) the points of a range image (E, A): 0 where nothing fired, the reach where nothing
-    returned.
+    """Return (P, 3) the points of a range image (E, A), which holds 0 for unfired cells and the
+    reach for no return.
     """
     told = ranges.ravel().astype(np.float64)
     cells = np.flatnonzero(told)
@@ -216,7 +217,7 @@ def scanned(grid: Grid, ranges: NDArray[np.float32]) -> Floats:
 
 def _example(points: Floats, sensor_height_m: float, present: Annotations, full: bool) -> Example:
     boxes = present.boxes
-    # Lifted, too: the road beneath a body, or a pavement, is no return of it.
+    # Also lifted: the road beneath a body, or a pavement, is no return of it.
     round_it = _ROUND_BOX_M * np.array([0.0, 0.0, 1.0, 2.0, 2.0, 0.0, 0.0])
     returns = points_within(np.ascontiguousarray(points), boxes + round_it)
     seen = (returns > 0) & within_plan(boxes)
@@ -226,13 +227,13 @@ def _example(points: Floats, sensor_height_m: float, present: Annotations, full:
 
 
 def within_plan(boxes: Floats) -> Mask:
-    """(n,) which of boxes (n, 7) have their middle on the plan."""
+    """Return (n,) which of boxes (n, 7) have their middle on the plan."""
     return np.asarray(np.abs(boxes[:, :2]).max(axis=1, initial=0) < REACH_M)
 
 
 def turned_example(example: Example, rng: np.random.Generator) -> Example:
-    """The example as another way of the sensor would have it: mirrored or not, and turned. What
-    stood in a corner of the plan may stand beside it then, and is left out.
+    """Return the example rotated and possibly mirrored. Objects that leave the plan at its corners
+    are left out.
     """
     side = float(rng.choice([-1.0, 1.0]))
     turn = float(rng.uniform(-MOST_TURN, MOST_TURN))
@@ -249,19 +250,19 @@ def turned_example(example: Example, rng: np.random.Generator) -> Example:
 
 
 SPREAD_M = (0.8, 1.6)
-"""Standard deviation of the bump at a centre: of a person, and of the longest bus; between them a
-quarter of the length."""
-TOLD_FROM = 0.2
-"""Where a bump is higher, the cell is asked for the box: neighbours of the centre tell of it, too.
+"""Standard deviation of the bump at a centre, of a person and of the longest bus; between them a
+quarter of the length.
 """
+TOLD_FROM = 0.2
+"""Height of a bump from which a cell predicts the box: neighbours of the centre predict it too."""
 BOX_SHARE = 1.0
-"""Of the differences of boxes in the loss."""
+"""Weight of box differences in the loss."""
 
 
 class Targets(NamedTuple):
-    """Targets of s scans: `sure` (s, classes, CELLS, CELLS) bumps of height 1 at the centres,
-    `boxes` (s, BOX_OUTPUTS, CELLS, CELLS), and how much each cell's box counts, `weights` (s, 1,
-    CELLS, CELLS).
+    """Targets of s scans. `sure` (s, classes, CELLS, CELLS) are bumps of height 1 at the centres,
+    `boxes` (s, BOX_OUTPUTS, CELLS, CELLS) the outputs. `weights` (s, 1, CELLS, CELLS) belong to
+    each cell's box.
     """
 
     sure: NDArray[np.float32]
@@ -270,7 +271,7 @@ class Targets(NamedTuple):
 
 
 def targets_of(examples: list[Example]) -> Targets:
-    """Return the answers that the network should give."""
+    """Return the targets of the network."""
     s = len(examples)
     made = Targets(
         np.zeros((s, len(CLASSES), CELLS, CELLS), np.float32),
@@ -285,7 +286,7 @@ def targets_of(examples: list[Example]) -> Targets:
 
 
 def loss(torch: Any, answer: Any, wanted: Any) -> Any:
-    """How much an answer (s, OUTPUTS, CELLS, CELLS) is off the `Targets` as tensors."""
+    """Return the loss of an output (s, OUTPUTS, CELLS, CELLS) against `Targets` as tensors."""
     sure, told = answer[:, : len(CLASSES)], answer[:, len(CLASSES) :]
     log = torch.nn.functional.logsigmoid
     chance = torch.sigmoid(sure)
@@ -298,10 +299,10 @@ def loss(torch: Any, answer: Any, wanted: Any) -> Any:
     return -(missed + invented).sum() / centres + BOX_SHARE * off
 
 
-def box_told(
+def box_targets(
     box: Floats, sensor_height_m: float, rows: Integers, columns: Integers
 ) -> NDArray[np.float32]:
-    """(BOX_OUTPUTS, n) what cells in these `rows` (n,) and `columns` (n,) should tell of a box
+    """Return (BOX_OUTPUTS, n) the targets of cells at `rows` (n,) and `columns` (n,) for a box
     (7,).
     """
     x, y, z, length, width, height, yaw = box.tolist()
@@ -326,8 +327,8 @@ def _mark(own: Targets, label: int, box: Floats, sensor_height_m: float) -> None
     bump = np.exp(-away / (2 * spread**2)).astype(np.float32)
     own.sure[label, rows, columns] = np.maximum(own.sure[label, rows, columns], bump)
 
-    # A cell between two objects tells of the one whose bump is higher there.
+    # A cell between two objects predicts the object with the higher bump.
     near = (bump > TOLD_FROM) & (bump > own.weights[0, rows, columns])
     rows, columns = rows[near], columns[near]
     own.weights[0, rows, columns] = bump[near]
-    own.boxes[:, rows, columns] = box_told(box, sensor_height_m, rows, columns)
+    own.boxes[:, rows, columns] = box_targets(box, sensor_height_m, rows, columns)

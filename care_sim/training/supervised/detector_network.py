@@ -1,4 +1,4 @@
-"""The network of the learned detector while it learns: its layers normalise over a batch."""
+"""The network of the learned detector in training: its layers normalise over a batch."""
 
 from typing import Any
 
@@ -20,8 +20,9 @@ from care_sim.perception.pillars.network import (
 from care_sim.training.supervised.detector_data import Example
 
 RARE = -4.0
-"""The logit that a centre lies in a cell, before anything is learned: one cell in fifty. From even
-odds the first steps would all go into unlearning them."""
+"""Initial logit of a centre in a cell: one cell in fifty. With even odds the first steps would be
+spent on unlearning them.
+"""
 
 
 class Learning(nn.Module):
@@ -33,7 +34,7 @@ class Learning(nn.Module):
         self._places = place_planes(torch)
 
     def forward(self, examples: list[Example]) -> Tensor:
-        """(s, OUTPUTS, CELLS, CELLS) the answers to the scans of some examples."""
+        """Return (s, OUTPUTS, CELLS, CELLS) the outputs for the scans of some examples."""
         seen = [on_plan(one.points.astype(np.float64), one.sensor_height_m) for one in examples]
         pillars = [one.pillars + number * PILLARS**2 for number, one in enumerate(seen)]
         inputs = torch.from_numpy(np.concatenate([one.inputs for one in seen]))
@@ -48,8 +49,8 @@ class Learning(nn.Module):
         return told
 
     def begin_at(self, arrays: Arrays, examples: list[Example]) -> None:
-        """Act as weights that were learned before, to learn on. Each layer is normalised over some
-        `examples`: scale and offset then undo it, so that on these the answers are the same.
+        """Start from learned weights. Each layer is normalised over some `examples`; scale and
+        offset undo the normalisation, so that outputs on these examples stay.
         """
         hooks = []
         with torch.no_grad():
@@ -70,7 +71,7 @@ class Learning(nn.Module):
             hook.remove()
 
     def arrays(self) -> Arrays:
-        """The numbers as they act once nothing is learned any more."""
+        """Return the numbers for detection."""
         made: Arrays = {}
         with torch.no_grad():
             for name, layer in LAYERS.items():
@@ -97,7 +98,7 @@ def _module(layer: Layer) -> nn.Sequential:
 
 
 def _undone(normal: Any, bias: Tensor) -> Any:
-    """A hook that lets a normalisation leave what comes to it as it is, but for a `bias`."""
+    """Return a hook that makes a normalisation the identity plus a `bias`."""
 
     def set_up(_module: Any, _given: Any, planes: Tensor) -> None:
         mean, variance = planes.mean((0, 2, 3)), planes.var((0, 2, 3), unbiased=False)
@@ -110,11 +111,11 @@ def _undone(normal: Any, bias: Tensor) -> Any:
 
 
 def _fixed(module: Any) -> tuple[Tensor, Tensor]:
-    """The weight and the bias that do what a module does in evaluation."""
+    """Return the weight and bias that equal a module in evaluation."""
     first = module[0]
     if first.bias is not None:
         return first.weight, first.bias
-    # A normalisation whose mean and variance are fixed is one more multiplication and sum.
+    # A normalisation with fixed mean and variance is linear.
     normal = module[1]
     scale = normal.weight / torch.sqrt(normal.running_var + normal.eps)
     return first.weight * scale.view(-1, 1, 1, 1), normal.bias - normal.running_mean * scale

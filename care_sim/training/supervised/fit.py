@@ -23,13 +23,13 @@ _Batch = TypeVar("_Batch")
 _Thing = TypeVar("_Thing")
 
 LEARNING_RATE = 3e-3
-"""Of Adam, at the first step."""
+"""Rate of Adam at the first step."""
 LATELY = 250
-"""Steps whose mean loss is shown."""
+"""Steps over which the shown loss is averaged."""
 
 
-def adam(parameters: Iterable[Any], steps: int) -> tuple[Any, Any]:
-    """Adam, whose rate falls to 0 along a half cosine over so many steps."""
+def make_adam(parameters: Iterable[Any], steps: int) -> tuple[Any, Any]:
+    """Return Adam with a rate that falls to 0 along a half cosine over this many steps."""
     optim = import_torch().optim
     optimizer = optim.Adam(parameters, lr=LEARNING_RATE)
     return optimizer, optim.lr_scheduler.CosineAnnealingLR(optimizer, steps)
@@ -42,11 +42,11 @@ def fit(
     descent: tuple[Any, Any],
     after: Callable[[list[float]], None] = lambda _losses: None,
 ) -> list[float]:
-    """Let the optimizer of a `descent`, with its schedule, make so many steps, one per batch.
+    """Run the optimizer of a `descent`, with its schedule, for this many steps, one per batch.
 
-    Returns the loss of every step; `after` is handed those so far after each. Call it in
-    `one_thread`: the same machine then makes the same bytes. Raises InvalidInput where the loss is
-    no number any more.
+    Returns the loss of every step; `after` is called with the losses so far after each step. Call
+    it in `one_thread`: the same machine then makes the same bytes. Raises InvalidInput if the loss
+    is not finite.
     """
     torch = import_torch()
     optimizer, schedule = descent
@@ -56,7 +56,7 @@ def fit(
         for step, batch in zip(range(1, steps + 1), batches, strict=False):
             optimizer.zero_grad()
             off = loss(batch)
-            # Every later step would be no number, either.
+            # Later steps would not be finite either.
             if not torch.isfinite(off):
                 raise InvalidInput(
                     f"the training diverged: the loss of step {step} is {off.item()}; another "
@@ -72,17 +72,15 @@ def fit(
     return losses
 
 
-def one_by_one(things: Sequence[_Thing], what: str) -> Iterator[_Thing]:
-    """All of the things; how far it has come is told on stderr."""
+def show_each(things: Sequence[_Thing], what: str) -> Iterator[_Thing]:
+    """Yield all items and show the progress on stderr."""
     for number, thing in enumerate(things, 1):
         print(f"{what} {number} of {len(things)}", end="   \r", file=sys.stderr, flush=True)
         yield thing
 
 
 def card_of(kind: str, library: str = "torch", sensor: Sensor = DEFAULT_SETUP, **told: Any) -> Card:
-    """The card of a file for the grid of a sensor set-up, the paper's unless given, made here and
-    now.
-    """
+    """Return the card of a new file for the grid of a sensor set-up, by default the paper's."""
     setup = sensor_setup(sensor)
     return Card(
         kind,
@@ -97,8 +95,8 @@ def card_of(kind: str, library: str = "torch", sensor: Sensor = DEFAULT_SETUP, *
 def print_end(
     out: Path, started: float, result: Mapping[str, float], scenes: Scenes | None, *play: str
 ) -> None:
-    """Print what was reached since `started`, and the command that plays it: that of the `scenes`,
-    or else of the words `play`.
+    """Print the result since `started`, and the command that plays the weights: that of the
+    `scenes`, or the words `play`.
     """
     told = ", ".join(f"{name} {value:.4g}" for name, value in result.items())
     print_lines(

@@ -1,4 +1,4 @@
-"""Options of the trainings on truth. Help loads them, and no simulator."""
+"""Options of the trainings on truth. Help loads them without a simulator."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,7 +7,7 @@ from typing import Literal, get_args
 from care_sim.base.checks import LARGEST_INTEGER, bounded, check_fields, check_known
 
 Part = Literal["attention", "inputs", "place", "faults"]
-"""What `learned-sets` can be trained without."""
+"""Parts that the training of `learned-sets` can leave out."""
 
 
 @dataclass(frozen=True)
@@ -49,11 +49,12 @@ class ScorerConfig(FitConfig):
     """
 
     steps: int = bounded(4000, 1, LARGEST_INTEGER)
-    """Batches that are learned from."""
+    """Training batches."""
     drawn: bool = False
-    """Learn from drives, tests of Euro NCAP and streets of training seeds, with budgets and faults
-    of the camera drawn for every play, instead of from the calibration streets. With --source, draw
-    budgets and faults for its scenes."""
+    """Learn from drives, tests of Euro NCAP and streets of training seeds, instead of the
+    calibration streets. Budgets and camera faults are drawn for every play. With --source, draw
+    them for its scenes.
+    """
 
 
 @dataclass(frozen=True)
@@ -64,10 +65,11 @@ class SetsConfig(FitConfig):
     """
 
     steps: int = bounded(3000, 1, LARGEST_INTEGER)
-    """Batches that are learned from in each round."""
+    """Training batches per round."""
     without: tuple[Part, ...] = ()
-    """What to leave out, to see what it is worth: what an item is told of the others; all that is
-    told of it but its kind; the map of places; faults of the camera."""
+    """Parts to leave out, to measure their worth: attention between items; all inputs but the kind;
+    the map of places; faults of the camera.
+    """
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -83,9 +85,10 @@ class DetectorConfig(FitConfig):
     """
 
     steps: int = bounded(10_000, 1, 1_000_000)
-    """Batches of four scans that are learned from."""
+    """Training batches of four scans."""
     clutter: bool = False
-    """Learn from cluttered streets alone, seen by several set-ups, and not from clean streets and
-    drives."""
+    """Learn only from cluttered streets, seen by several set-ups, instead of clean streets and
+    drives.
+    """
     start: Path | None = None
-    """File of weights to learn on from; without it the first ones are drawn."""
+    """File of weights to start from; by default they are drawn."""

@@ -1,5 +1,5 @@
-"""Make the map of the control `place`: in which cells first sightings were detected in the
-calibration's streets.
+"""Make the map of the control `place`: the cells that detect first sightings on the calibration
+streets.
 """
 
 import time
@@ -18,15 +18,15 @@ from care_sim.policies.learned.weights import save_weights
 from care_sim.policies.paper.blind import Full
 from care_sim.sources.street_films import street_film
 from care_sim.streets.street import CALIBRATION_SEEDS
-from care_sim.training.supervised.fit import card_of, one_by_one, print_end
+from care_sim.training.supervised.fit import card_of, print_end, show_each
 from care_sim.training.supervised.options import PlaceConfig
 
 
 def train_place(config: PlaceConfig) -> int:
-    """Make the map and write it; returns the exit code of the command."""
+    """Make and write the map, and return the exit code of the command."""
     check_output(config.out, ZIP)
     started = time.perf_counter()
-    seeds = one_by_one(CALIBRATION_SEEDS, "calibration street")
+    seeds = show_each(CALIBRATION_SEEDS, "calibration street")
     found = [cells for seed in seeds for cells in first_returns(street_film(seed))]
     card = card_of(
         "place",
@@ -41,7 +41,7 @@ def train_place(config: PlaceConfig) -> int:
 
 
 def first_returns(film: Film) -> Iterator[Cells]:
-    """The cells of every first sighting of a film that a full scan detects at once."""
+    """Return the cells of every first sighting of a film that a full scan detects at once."""
     with FilmEnv(film, budget=1.0) as env:
         observation, _ = env.reset(seed=0)
         full = Full(env.rig)
@@ -54,10 +54,9 @@ def first_returns(film: Film) -> Iterator[Cells]:
 
 
 def sighting_map(found: list[Cells], grid: AngularGrid) -> NDArray[np.float32]:
-    """(E, A) first sightings per cell; those of `found` weigh 1 each, however many cells they have.
-
-    They are few beside the cells, so they are smoothed over the margins of the paper, which are its
-    guess of how far off a box can be; columns are closed to a circle.
+    """Return (E, A) first sightings per cell. Each sighting of `found` weighs 1, however many cells
+    it has. Sightings are few, so they are smoothed over the paper's margins, its estimate of box
+    errors. Columns wrap around.
     """
     sightings = np.zeros(grid.size)
     for cells in found:

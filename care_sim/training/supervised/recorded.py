@@ -1,7 +1,7 @@
-"""Scenes of a source to learn from, and those that are held out of the learning.
+"""Scenes of a source for training, and held-out ones.
 
-Each part has whole scenes, and no scene is in both. Truth is what the source annotates: an object
-without an annotation at a keyframe is not there, and a return in no box is one of the surroundings.
+Each part has whole scenes, and no scene is in both. The annotations are truth: an object without an
+annotation at a keyframe is absent, and a return in no box belongs to the surroundings.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,21 +22,21 @@ from care_sim.training.supervised.worlds import World
 
 _STREET, _REPLAY = OPEN_LOOP
 HELD_OUT_EVERY = 5
-"""One scene in five is held out, where no validation split is named."""
+"""One scene in five is held out if no validation split is named."""
 MOST_HELD_OUT = 48
-"""Scenes that are played to say what was reached. More scenes are thinned at equal steps."""
+"""Scenes played for the results. More scenes are thinned at equal steps."""
 SCENES_KEPT = 50
-"""Up to 50 scenes give all their keyframes. More scenes give a share, so that memory stays the
+"""Up to 50 scenes use all their keyframes. More scenes use a share, so that memory stays the
 same.
 """
 
 
 @dataclass(frozen=True)
 class Scenes:
-    """The scenes of a `source` that are `learned` from, and those that are `held_out`. `splits`
-    name the splits of both, where the source has some, and `play` are the words of the command
-    that plays the weights on what is held out. `told` is what a card says of them: sensor,
-    scenario, which scenes, a digest of the files of each part, and the terms of the recordings.
+    """The scenes of a `source` for training (`learned`) and those `held_out`. `splits` name the
+    splits of both, if the source has some. `play` are the words of the command that plays the
+    weights on held-out scenes. `told` is the card's description: sensor, scenario, scenes, a digest
+    of the files of each part, and the terms of the recordings.
     """
 
     source: Source
@@ -47,23 +47,21 @@ class Scenes:
     told: dict[str, Any] = field(init=False)
 
     def __post_init__(self) -> None:
-        # Before anything is learned: a file that is missing is told at once.
-        object.__setattr__(self, "told", self._told())
+        # Before training, so that a missing file is reported at once.
+        object.__setattr__(self, "told", self._describe())
 
     def worlds(self, part: Sequence[Scene], turn: int = 0) -> list[World]:
-        """A world of every scene of a part. Another `turn` plays the scenes in another way."""
+        """Return a world of every scene of a part. Another `turn` plays the scenes differently."""
         share = min(1.0, SCENES_KEPT / len(part))
         return [self._world(scene, turn, share) for scene in part]
 
     def endless(self) -> Iterator[World]:
-        """The scenes that are learned from, again and again in another order, each time another
-        play.
-        """
+        """Yield the training scenes endlessly, each time in another order and play."""
         for turn in count():
             for row in np.random.default_rng(turn).permutation(len(self.learned)).tolist():
                 yield self._world(self.learned[row], turn)
 
-    def _told(self) -> dict[str, Any]:
+    def _describe(self) -> dict[str, Any]:
         parts = [
             f"{len(part)} scene{'s' * (len(part) > 1)} {doing}{split and f', split {split}'}"
             f"{self._digest(part)}"
@@ -87,7 +85,7 @@ class Scenes:
         }
 
     def _world(self, scene: Scene, turn: int, share: float = 1.0) -> World:
-        # Scenes of recordings share one seed, so the name decides what is drawn.
+        # Scenes of recordings share one seed, so the name decides the draws.
         seed = crc32(f"{scene.name} {turn}".encode())
         return World("scene", seed, partial(film_of, self.source, scene), share)
 
@@ -98,7 +96,7 @@ class Scenes:
 
     @property
     def _reading(self) -> str:
-        """How the first scene is read, where that is not the usual way."""
+        """Return how the first scene is read, if not in the usual way."""
         row: Mapping[str, Any] = self.source.row(self.learned[0])
         told = [f"{name} {row[name]}" for name in row if name not in ("source", "recording")]
         return f"; read with {', '.join(told)}" if told else ""
@@ -107,11 +105,9 @@ class Scenes:
 def parted(
     source: Source, scenes: Sequence[Scene], apart: Sequence[Scene] | None = None
 ) -> tuple[tuple[Scene, ...], tuple[Scene, ...]]:
-    """Part scenes into those to learn from and those that are held out: the scenes `apart`, or else
-    whole logs with one scene in `HELD_OUT_EVERY`.
-
-    Raises InvalidInput where a scene is in both, and for a single one without another to hold out.
-    Reports a log that is in both.
+    """Split scenes into training and held-out ones. Held out are the scenes `apart`, or else whole
+    logs with one scene in `HELD_OUT_EVERY`. Raises InvalidInput if a scene is in both parts, and
+    for a single scene. Reports a log that is in both.
     """
     if apart is None:
         if len(scenes) < 2:
@@ -137,8 +133,8 @@ def parted(
 
 
 def _whole_logs(source: Source, scenes: Sequence[Scene]) -> list[Scene]:
-    """The scenes of the shortest logs, of equally long ones the last: many logs show many streets.
-    Of a single log the last scenes, which adjoin the others in one place alone.
+    """Return the scenes of the shortest logs, the last of equally long ones: many logs show many
+    streets. For a single log, return its last scenes, which adjoin the others at one place only.
     """
     by_log: dict[str, list[Scene]] = {}
     for scene in scenes:
@@ -146,7 +142,7 @@ def _whole_logs(source: Source, scenes: Sequence[Scene]) -> list[Scene]:
     logs = [*by_log.values()] if len(by_log) > 1 else [[scene] for scene in scenes]
     wanted = min(-(-len(scenes) // HELD_OUT_EVERY), MOST_HELD_OUT)
     apart: set[Scene] = set()
-    # From the shortest to the second longest: something is left to learn from.
+    # From the shortest to the second longest, so that some logs remain for training.
     for log in sorted(logs, key=len, reverse=True)[:0:-1]:
         if len(apart) < wanted:
             apart.update(log)

@@ -1,26 +1,26 @@
 """Train the learned scorer: `care-sim train learned-scorer` makes the shipped weights from nothing,
 `--drawn` others, from worlds that differ.
 
-The paper names no network and no loss. Both are the plainest that do: one hidden layer of rectified
-units for every cell by itself, and the weighted logistic loss, whose best score orders the cells by
-the odds that they find an object. Adam runs a fixed number of steps over shuffled batches, its rate
-falling to 0 along a half cosine. One thread and fixed seeds: the same machine makes the same bytes.
+The paper names no network and no loss. Both are as plain as possible. The network has one hidden
+layer of rectified units for each cell alone. The loss is the weighted logistic loss, whose best
+score orders cells by their odds of detecting an object. Adam runs a fixed number of steps over
+shuffled batches, its rate falling to 0 along a half cosine. With one thread and fixed seeds, the
+same machine makes the same bytes.
 
-Truth is used here, at training, and nowhere else. The paper says that 20 scenes apart from the
-evaluation's train it, and no more. The rest was decided before a result was seen:
+Truth is used only here, in training. The paper only says that 20 scenes outside the evaluation
+train the network. The rest was decided before a result was seen:
 
 - An example is a cell at a keyframe. It is positive if its return of the full scan lies on an
   object that has no track and that can be detected at all, in MIN_RETURNS cells or more.
-- The scenes are played by `history`, the policy whose reserve is learned, at budgets from the
-  scarcest to the most generous that are studied, so that one file serves them all.
-- They are played with all cameras and with the front one alone: the closed loop has no other.
-- Worlds that differ are those of `care_sim.training.supervised.worlds`, and `history` plays them,
-  too. Nothing is mirrored: the inputs of a cell do not tell left from right.
+- The policy `history`, whose reserve is learned, plays the scenes at all studied budgets, so that
+  one file serves them all.
+- Scenes are played with all cameras and with only the front one, the closed loop's only camera.
+- Drawn worlds are those of `care_sim.training.supervised.worlds`, also played by `history`. Nothing
+  is mirrored: the inputs of a cell do not distinguish left from right.
 - First sightings count objects, not cells, so the cells of an object weigh 1 together, however many
   they are.
-- All positive cells are kept. Of the others, of which there are sixty times as many, about as many
-  are kept at random. They weigh together what the positive ones do, so that neither drowns the
-  other.
+- All positive cells are kept. There are sixty times as many negative cells, of which about as many
+  are kept at random. Both groups have the same total weight.
 """
 
 import time
@@ -52,7 +52,7 @@ from care_sim.policies.paper.tracks import History
 from care_sim.sensors.setups import DEFAULT_SETUP
 from care_sim.sources.street_films import street_film
 from care_sim.streets.street import CALIBRATION_SEEDS
-from care_sim.training.supervised.fit import adam, card_of, fit, one_by_one, print_end
+from care_sim.training.supervised.fit import card_of, fit, make_adam, print_end, show_each
 from care_sim.training.supervised.options import ScorerConfig
 from care_sim.training.supervised.recorded import Scenes
 from care_sim.training.supervised.worlds import (
@@ -70,11 +70,11 @@ from care_sim.training.supervised.worlds import (
 )
 
 SCORER_BUDGETS = (0.03, 0.10, 0.35)
-"""The paper's scarcest closed loop, the budget that both loops share, and its most generous open
-loop.
+"""The paper's smallest closed-loop budget, the budget of both loops, and its largest open-loop
+budget.
 """
 OTHER_CELLS = 200
-"""Cells drawn per keyframe; those that are not positive are kept as examples."""
+"""Cells drawn per keyframe; negative ones become examples."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class Examples:
     inputs: Float32s
     """(n, SCAN_INPUTS + len(RIG_INPUTS))"""
     positive: Mask
-    """(n,) whether an untracked object returns from them."""
+    """(n,) whether an untracked object returns from each."""
     weights: Float32s
     """(n,)"""
 
@@ -93,7 +93,7 @@ class Examples:
 
 
 def examples(world: World) -> Iterator[Examples]:
-    """The examples of the street of a seed, or of the scene of a source, one play at a time."""
+    """Yield the examples of a seed's street, or of a source's scene, one play at a time."""
     film = world.film() if world.film else street_film(world.seed)
     for number, (shown, budget) in enumerate(product(views_of(film), SCORER_BUDGETS)):
         rng = np.random.default_rng([world.seed, number])
@@ -102,14 +102,16 @@ def examples(world: World) -> Iterator[Examples]:
 
 
 def drawn_examples(world: World) -> Iterator[Examples]:
-    """The examples of a world under drawn budgets and faults, one keyframe at a time."""
+    """Yield the examples of a world under drawn budgets and faults, one keyframe at a time."""
     rng = np.random.default_rng([world.seed, len(world.kind)])
     for env in plays(world, rng):
         yield from _play(env, world, rng, thinned=True)
 
 
 def balanced(parts: Iterable[Examples]) -> Examples:
-    """All parts as one, positive and other examples of equal weight, 1 on average."""
+    """Join all parts; positive and negative examples have equal total weight, 1 per example on
+    average.
+    """
     together = _joined([*parts])
     # In float64: millions of weights are summed. Each group then weighs half of the total.
     weights = together.weights.astype(np.float64)
@@ -119,19 +121,18 @@ def balanced(parts: Iterable[Examples]) -> Examples:
 
 
 def untracked_cells(loop: OpenLoop | OneWorld) -> tuple[Cells, Float32s]:
-    """Cells (n,) of the coming keyframe that should fire, and what each weighs (n,). Truth.
-
-    In the full scan they have a return from an object in range that has no track and can be
-    detected.
+    """Return the cells (n,) of the next keyframe that should fire, and their weights (n,). Truth.
+    In the full scan they have a return from a detectable object in range without a track.
     """
     objects, boxes, returning, behind = present(loop)
     in_range = planar_ranges(boxes) <= RANGE_M
     tracked = np.isin(objects, loop.true_objects(loop.belief.tracks))
     wanted = np.isin(behind, objects[in_range & ~tracked])
-    # Each cell once, for the object of its first return: those of a recorded sweep may share one.
+    # Each cell once, for the object of its first return: returns of a recorded sweep may share a
+    # cell.
     cells, first = np.unique(returning[wanted], return_index=True)
-    # `sizes` (objects,): how many of the cells an object has; `group` (cells,): a cell's place in
-    # it. Fewer than MIN_RETURNS would not detect the object.
+    # `sizes` (objects,) counts the cells of an object; `group` (cells,) maps cells to `sizes`.
+    # Fewer than MIN_RETURNS would not detect the object.
     _, group, sizes = np.unique(behind[wanted][first], return_inverse=True, return_counts=True)
     enough = sizes[group] >= MIN_RETURNS
     return cells[enough], (1 / sizes[group[enough]]).astype(np.float32)
@@ -154,7 +155,7 @@ def _keyframe(
     loop: OpenLoop | OneWorld, belief: Belief, inputs: CellInputs, rng: np.random.Generator
 ) -> Examples:
     positive, shares = untracked_cells(loop)
-    # Drawn from all cells and not from the others alone: a few of so many are positive.
+    # Drawn from all cells, not only from negative ones: few cells are positive.
     others = np.setdiff1d(rng.choice(inputs.rig.grid.size, OTHER_CELLS, replace=False), positive)
     cells = np.concatenate([positive, others])
     seen = inputs.of(belief, inputs.rig.hulls(belief.tracks.boxes))
@@ -176,34 +177,34 @@ def _joined(parts: list[Examples]) -> Examples:
 
 
 HIDDEN_UNITS = 16
-"""As many as score a keyframe within half a millisecond on one core."""
+"""Hidden units: as many as score a keyframe within half a millisecond on one core."""
 BATCH = 4096
 """Cells per gradient."""
 STREETS: Mapping[str, tuple[int, ...]] = {
     "calibration": CALIBRATION_SEEDS,
     "held out": tuple(range(2000, 2004)),
 }
-"""Seeds of streets to learn from, and of those that belong neither to the calibration nor to the
-evaluation. The card tells the loss on both.
+"""Seeds of training streets, and of streets outside calibration and evaluation. The card holds the
+loss on both.
 """
 DRAWN: Mapping[str, tuple[int, Mapping[str, int]]] = {
     "learned": (TRAINING, {"drive": 48, "ncap": 144, "street": 8}),
     "held out": (VALIDATION, {"drive": 6, "ncap": 18, "street": 1}),
 }
-"""With `--drawn`, the first seed and how many worlds of each kind: about 6,500 keyframes to learn
-from, 2,560 of them of streets.
+"""With `--drawn`, the first seed and the number of worlds of each kind: about 6,500 training
+keyframes, 2,560 of them of streets.
 """
 
 
 def train_learned_scorer(config: ScorerConfig, scenes: Scenes | None = None) -> int:
-    """Train the policy, on `scenes` if there are some, and write its weights; returns the exit code
-    of the command.
+    """Train the policy, on `scenes` if given, write its weights, and return the exit code of the
+    command.
     """
     started = time.perf_counter()
     worlds, told = _lessons(config.drawn, scenes)
     made = drawn_examples if config.drawn else examples
     data = {
-        name: balanced(part for world in one_by_one(own, f"{name} world") for part in made(world))
+        name: balanced(part for world in show_each(own, f"{name} world") for part in made(world))
         for name, own in worlds.items()
     }
     arrays, losses = train_scorer(data, config.seed, config.steps)
@@ -226,8 +227,8 @@ def train_learned_scorer(config: ScorerConfig, scenes: Scenes | None = None) -> 
 def train_scorer(
     data: Mapping[str, Examples], seed: int, steps: int
 ) -> tuple[Arrays, dict[str, float]]:
-    """The weights that the first set of examples teaches, and the loss on every set (log 2 = 0.69
-    without any knowledge).
+    """Train on the first set of examples. Returns the weights, and the loss on every set (log 2 =
+    0.69 without any knowledge).
     """
     torch = import_torch()
     learned = next(iter(data.values()))
@@ -239,7 +240,9 @@ def train_scorer(
             torch.nn.Linear(HIDDEN_UNITS, 1, bias=False),
         )
         batches = _batches(np.random.default_rng(seed), len(learned))
-        fit(partial(_loss, network, learned), batches, steps, adam(network.parameters(), steps))
+        fit(
+            partial(_loss, network, learned), batches, steps, make_adam(network.parameters(), steps)
+        )
         with torch.no_grad():
             losses = {
                 name: float(_loss(network, cells, np.arange(len(cells))))
@@ -251,10 +254,8 @@ def train_scorer(
 
 
 def _batches(rng: np.random.Generator, count: int) -> Iterator[NDArray[np.int64]]:
-    """Rows (n,) of batches without end.
-
-    Each pass over the examples is in random order; what does not fill a batch at its end is left
-    out.
+    """Yield endless batches of rows (n,). Each pass over the examples is in random order; an
+    incomplete last batch is left out.
     """
     size = min(BATCH, count)
     order = np.empty(0, np.int64)
@@ -266,7 +267,7 @@ def _batches(rng: np.random.Generator, count: int) -> Iterator[NDArray[np.int64]
 
 
 def _loss(network: Any, data: Examples, rows: NDArray[np.int64]) -> Any:
-    """The weighted logistic loss over some examples."""
+    """Return the weighted logistic loss over some examples."""
     torch = import_torch()
     inputs, positive, weights = (
         torch.from_numpy(column[rows]) for column in (data.inputs, data.positive, data.weights)
@@ -283,8 +284,8 @@ _DRAWN_PLAYED = (
 
 
 def _lessons(drawn: bool, scenes: Scenes | None) -> tuple[dict[str, list[World]], dict[str, Any]]:
-    """The worlds to learn from and those that are held out, by the name of the part, and what the
-    card says of them.
+    """Return training and held-out worlds, by the name of the part, and their description for the
+    card.
     """
     if scenes:
         worlds = {

@@ -1,30 +1,29 @@
 """Train the policy `learned-sets`: `care-sim train learned-sets` makes the shipped weights from
 nothing.
 
-Two rounds: in the first somebody else's policies play, in the second mostly this one with what the
-first has taught it, and it learns anew from the keyframes of both. One thread and fixed seeds: the
-same machine makes the same bytes.
+There are two rounds. Other policies play the first; in the second mostly this policy plays, with
+the weights of the first. It then learns anew from the keyframes of both. With one thread and fixed
+seeds, the same machine makes the same bytes.
 
-What it says of an item is a share for each number of cells after which it is found, and one for
-never: cross-entropy. What it says of a strip is a chance: logistic loss, against the share of a
-detection. Both are proper, so that chances are chances, which the choice of cells relies on.
+An item's output is a share for each number of cells after which it is detected, and one for never
+(cross-entropy). A strip's output is a chance (logistic loss against the share of a detection). Both
+losses are proper, so that outputs are true chances, which the choice of cells needs.
 
-It can be trained without a part, to see what that part was worth:
+It can be trained without a part, to measure that part's worth:
 
-| without | what is taken away |
+| without | removed part |
 |---|---|
-| `attention` | what an item is told of the others |
-| `inputs` | what is told of an item, but its kind, and of a strip, but its place |
+| `attention` | an item's inputs from other items |
+| `inputs` | all inputs of an item but its kind, and of a strip but its place |
 | `place` | the map of the strips: one chance for all places |
-| `faults` | faults of the camera in the worlds that are learned from |
+| `faults` | camera faults in the training worlds |
 
-A kind is a camera box that a track explains, one that no track explains, or a track. So without
-`attention`, `inputs` and `place` what is learned are constants: for each kind the shares of items
-that are found after so many cells, and one chance for all strips. It is the control of what
-learning is worth beside the choice of cells, which stays.
+A kind is an explained camera box, an unexplained one, or a track. So without `attention`, `inputs`
+and `place` only constants are learned: for each kind the shares of items detected after each number
+of cells, and one chance for all strips. This control measures the worth of learning beside the
+choice of cells, which stays.
 
-Weights that are taken away are 0 and stay it; those of the map learn as one. So the file has the
-form of any other, and acts as such.
+Removed weights stay 0; those of the map learn as one. So the file has the usual form.
 """
 
 import sys
@@ -46,31 +45,31 @@ from care_sim.policies.learned.learned_sets import STEPS, LearnedSets
 from care_sim.policies.learned.set_items import ITEM_INPUTS, MIRRORED, STRIP_INPUTS, ItemReader
 from care_sim.policies.learned.weights import Card, save_weights
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
-from care_sim.training.supervised.fit import adam, card_of, fit, one_by_one, print_end
+from care_sim.training.supervised.fit import card_of, fit, make_adam, print_end, show_each
 from care_sim.training.supervised.options import SetsConfig
 from care_sim.training.supervised.recorded import Scenes
 from care_sim.training.supervised.sets_data import Example, play
 from care_sim.training.supervised.worlds import SCENARIOS, World, generated_worlds
 
 KIND = ("is a camera box", "explained")
-"""The inputs that tell an item's kind."""
+"""The inputs of an item's kind."""
 UNITS, WIDTH, STRIP_UNITS = 48, 16, 16
 KEYFRAMES = 64
-"""Per gradient."""
+"""Items per gradient."""
 RARE = 0.001
-"""About the chance of a strip, from which the map begins."""
+"""Typical chance of a strip, the initial value of the map."""
 ROUNDS: tuple[Mapping[str, int], ...] = (
     {"drive": 24, "ncap": 48, "street": 10},
     {"drive": 48, "ncap": 96, "street": 20},
 )
-"""How many worlds of each kind are played in each round."""
+"""Number of worlds of each kind in each round."""
 HELD_OUT: Mapping[str, int] = {"drive": 4, "ncap": 8, "street": 2}
-"""Worlds of validation seeds, played as in the second round; the card tells the loss on them."""
+"""Worlds of validation seeds, played as in the second round; the card holds the loss on them."""
 
 
 def train_sets(config: SetsConfig, scenes: Scenes | None = None) -> int:
-    """Train the policy, on `scenes` if there are some, and write its weights; returns the exit code
-    of the command.
+    """Train the policy, on `scenes` if given, write its weights, and return the exit code of the
+    command.
     """
     started = time.perf_counter()
     rig = Rig(sensor_setup(scenes.source.sensor).grid) if scenes else Rig()
@@ -96,8 +95,8 @@ def train_sets(config: SetsConfig, scenes: Scenes | None = None) -> int:
 
 
 def _worlds(scenes: Scenes | None) -> tuple[list[list[World]], list[World]]:
-    """The worlds of every round, and those that are held out. No generated world comes twice;
-    scenes do, under other budgets, faults and policies.
+    """Return the worlds of every round, and held-out ones. Generated worlds never repeat; scenes
+    repeat with other budgets, faults and policies.
     """
     if scenes:
         return [scenes.worlds(scenes.learned)] * len(ROUNDS), scenes.worlds(scenes.held_out)
@@ -107,10 +106,8 @@ def _worlds(scenes: Scenes | None) -> tuple[list[list[World]], list[World]]:
 
 
 def gathered(worlds: Sequence[World], own: Path | None, faulty: bool = True) -> list[Example]:
-    """The keyframes of worlds."""
-    return [
-        example for world in one_by_one(worlds, "world") for example in play(world, own, faulty)
-    ]
+    """Return the keyframes of worlds."""
+    return [example for world in show_each(worlds, "world") for example in play(world, own, faulty)]
 
 
 def learn(
@@ -120,7 +117,9 @@ def learn(
     steps: int,
     without: Collection[str] = (),
 ) -> Arrays:
-    """The weights, after so many steps over shuffled batches, `without` what is left out."""
+    """Return the weights after this many steps over shuffled batches, `without` the omitted
+    parts.
+    """
     torch = import_torch()
     with one_thread(torch):
         torch.manual_seed(seed)
@@ -131,13 +130,13 @@ def learn(
             lambda batch: sum(_losses(torch, arrays, *batch)),
             batches,
             steps,
-            adam(arrays.values(), steps),
+            make_adam(arrays.values(), steps),
         )
         return {name: array.detach().numpy() for name, array in arrays.items()}
 
 
 def losses_of(arrays: Arrays, examples: Sequence[Example]) -> dict[str, float]:
-    """The loss per item and per strip."""
+    """Return the loss per item and per strip."""
     torch = import_torch()
     with one_thread(torch), torch.no_grad():
         held = {name: torch.from_numpy(np.asarray(array)) for name, array in arrays.items()}
@@ -152,7 +151,7 @@ def losses_of(arrays: Arrays, examples: Sequence[Example]) -> dict[str, float]:
 def _batches(
     examples: Sequence[Example], rng: np.random.Generator
 ) -> Iterator[tuple[list[Example], Any]]:
-    """Examples drawn, and 1 or -1 for each: left and right are exchanged in half of them."""
+    """Yield drawn examples, with 1 or -1 for each: left and right are exchanged in half of them."""
     while True:
         rows = rng.integers(0, len(examples), KEYFRAMES)
         yield [examples[row] for row in rows], np.where(rng.random(KEYFRAMES) < 0.5, 1.0, -1.0)
@@ -182,7 +181,7 @@ def _first_weights(torch: Any, places: int) -> dict[str, Any]:
 
 
 def _leave_out(torch: Any, arrays: dict[str, Any], without: Collection[str]) -> None:
-    """Set what is not kept to 0, without a gradient; a map without places is one number."""
+    """Set omitted weights to 0, without a gradient; a map without places is one number."""
     kept: Arrays = {}
     if "attention" in without:
         kept["value"] = np.zeros(1, np.float32)
@@ -201,7 +200,7 @@ def _leave_out(torch: Any, arrays: dict[str, Any], without: Collection[str]) -> 
 def _losses(
     torch: Any, arrays: dict[str, Any], batch: Sequence[Example], signs: Any = None
 ) -> tuple[Any, Any]:
-    """The mean loss of the items of a batch, and that of its strips."""
+    """Return the mean loss of the items of a batch, and of its strips."""
     nets = torch.nn.functional
     most = max(max(len(one.answers) for one in batch), 1)
     inputs = np.zeros((len(batch), most, len(ITEM_INPUTS)), np.float32)
@@ -214,7 +213,8 @@ def _losses(
     there = torch.from_numpy(answers >= 0)
     units = nets.relu(torch.from_numpy(inputs) @ arrays["first"] + arrays["first_bias"])
     scores = (units @ arrays["query"]) @ (units @ arrays["key"]).transpose(1, 2) / WIDTH**0.5
-    # Padding is attended by nobody; a large finite number, since a keyframe may be all padding.
+    # No item attends to padding. The number is large but finite, since a keyframe may be all
+    # padding.
     told = nets.softmax(scores.masked_fill(~there[:, None], -1e9), -1) @ (units @ arrays["value"])
     both = torch.cat([units, told], -1)
     units = nets.relu(both @ arrays["second"] + arrays["second_bias"])
@@ -240,7 +240,7 @@ def _card(
     rounds: int,
     losses: Mapping[str, float] | None = None,
 ) -> Card:
-    """The card after so many rounds."""
+    """Return the card after this many rounds."""
     items = sum(len(one.answers) for one in examples)
     told = scenes.told if scenes else _generated(ROUNDS[:rounds])
     return card_of(

@@ -4,15 +4,15 @@ the scenes of a source.
 Truth is used here, at training, and nowhere else.
 
 - Worlds, budgets and faults of the camera are those of `care_sim.training.supervised.worlds`, of
-  training seeds or of scenes. What aims is drawn, too: somebody else's policy, or, in later rounds,
-  this one with the weights of the round before, so that it learns from what its own choice leads to
-  (DAgger: Ross, Gordon and Bagnell, A reduction of imitation learning, 2011).
-- Of an item the label says after how many of its cells, in its order, an object in range has
-  returned three times: of a track its own object, of a camera box an object that has no track. An
-  object that shows in several boxes is that of the one which finds it with the fewest cells.
-- Of a strip the label is the share of a detection that it brings of objects which no box and no
-  track would find: 1 from three returns on. An object that lies in several strips is that of the
-  one in which it has most returns, else near ones would count many times.
+  training seeds or of scenes. The policy is also drawn: another policy, or, in later rounds, this
+  one with the weights of the round before. So it learns from the results of its own choice (DAgger:
+  Ross, Gordon and Bagnell, A reduction of imitation learning, 2011).
+- An item's label is the number of its cells, in order, after which an object in range has returned
+  three times. For a track it is its own object, for a camera box an untracked object. An object in
+  several boxes belongs to the box that detects it with the fewest cells.
+- A strip's label is the share of a detection, 1 from three returns on, of objects that no box and
+  no track would detect. An object in several strips belongs to the strip with most of its returns;
+  otherwise near objects would count many times.
 """
 
 from collections.abc import Iterator
@@ -33,18 +33,19 @@ from care_sim.policies.learned.set_kernels import Numbers, needed_cells
 from care_sim.training.supervised.worlds import AnyEnv, World, kept, keyframes, plays, present
 
 OTHERS = ("care-spread", "care", "care-sightlines", "care-sector", "all-camera", "history-rows")
-"""Policies that are played besides this one."""
+"""Other policies that play."""
 OWN_SHARE = 0.6
-"""Of the plays of later rounds that this policy plays itself."""
+"""Share of later rounds that this policy plays itself."""
 OTHER_STRIPS = 40
-"""Strips drawn per keyframe; those with something to be found are all kept."""
+"""Strips drawn per keyframe; strips with a detection are all kept."""
 
 
 @dataclass(frozen=True)
 class Example:
-    """A keyframe: `inputs` (n, `ITEM_INPUTS`) of its items, the first `boxes` of them of camera
-    boxes, and `answers` (n,), a place in `STEPS`, its length for never. Of some strips (s,) the
-    `places`, `strips` (s, `STRIP_INPUTS`), `found` and how many strips each stands for, `weights`.
+    """A keyframe. `inputs` (n, `ITEM_INPUTS`) are of its items, the first `boxes` of them camera
+    boxes. `answers` (n,) are places in `STEPS`, its length for never. For some strips (s,):
+    `places`, `strips` (s, `STRIP_INPUTS`), `found`, and `weights`, the number of strips that each
+    represents.
     """
 
     inputs: Numbers
@@ -57,8 +58,8 @@ class Example:
 
 
 def play(world: World, own: Path | None, faulty: bool = True) -> list[Example]:
-    """The examples of a world. `own` are this policy's weights, of the round before, None in the
-    first. Without `faulty` the camera has no fault.
+    """Yield the examples of a world. `own` are this policy's weights of the round before, None in
+    the first. With `faulty=False` the camera has no fault.
     """
     rng = np.random.default_rng([world.seed, len(world.kind), own is not None])
     examples: list[Example] = []
@@ -99,11 +100,11 @@ def _example(env: AnyEnv, reader: ItemReader, items: Items, rng: np.random.Gener
     tracked = _numbered(env.loop.true_objects(tracks), objects[in_range])
     answers = np.zeros(len(sets), np.int64)
 
-    # Of a track, its own object.
+    # A track's target is its own object.
     rows = np.flatnonzero(tracked >= 0)
     answers[items.boxes + rows] = needed[items.boxes + rows, tracked[rows]]
 
-    # Of a box, an object without a track that no other box finds with fewer cells.
+    # A box's target is an untracked object that no other box detects with fewer cells.
     found = needed[: items.boxes]
     open_ = ~np.isin(np.arange(count), tracked)
     cost = np.where((found > 0) & open_, found, np.inf)
@@ -112,7 +113,7 @@ def _example(env: AnyEnv, reader: ItemReader, items: Items, rng: np.random.Gener
         box = int(cost[:, number].argmin())
         answers[box] = min(answers[box] or STEPS[-1], int(cost[box, number]))
 
-    # Of a strip, what is left.
+    # Strips get the remaining objects.
     counts = np.bincount(numbers[numbers >= 0], minlength=count)
     left = open_ & ~shown & (counts >= LEARNED_RETURNS)
     strips = _strip_shares(reader, numbers, left)
@@ -125,7 +126,7 @@ def _example(env: AnyEnv, reader: ItemReader, items: Items, rng: np.random.Gener
 
 
 def _numbered(objects: Integers, known: Integers) -> Integers:
-    """(n,) the places of `objects` (n,) among the known ones (k,), -1 of others."""
+    """Return (n,) the places of `objects` (n,) among the known ones (k,), -1 for others."""
     if not len(known):
         return np.full(len(objects), -1)
     order = np.argsort(known)
@@ -134,7 +135,7 @@ def _numbered(objects: Integers, known: Integers) -> Integers:
 
 
 def _strip_shares(reader: ItemReader, numbers: Integers, left: NDArray[np.bool_]) -> Floats:
-    """(S,) the share of a detection that every strip brings of the objects that are left (k,)."""
+    """Return (S,) the share of a detection of the remaining objects (k,) per strip."""
     behind = numbers[reader.strips]
     shares = np.zeros(len(behind))
     for number in np.flatnonzero(left).tolist():

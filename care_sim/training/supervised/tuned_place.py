@@ -1,7 +1,7 @@
-"""Make the map of the control `tuned-place`: the cells that detect most, one after the other.
+"""Make the map of the control `tuned-place`: repeatedly add the cell that detects most.
 
-The map is tuned to the very counts by which allocators are compared: newcomers that emerge and that
-enter, objects kept, people kept. It is what a fixed pattern can reach, and no camera is needed.
+The map is tuned to the counts that compare allocators: newcomers that emerge and that enter,
+objects kept, people kept. It shows what a fixed pattern without a camera can reach.
 """
 
 import time
@@ -24,22 +24,23 @@ from care_sim.loops.film import Film
 from care_sim.perception.measured.recall import FIRST_HIT
 from care_sim.policies.learned.weights import save_weights
 from care_sim.sources.street_films import street_film
-from care_sim.training.supervised.fit import card_of, one_by_one, print_end
+from care_sim.training.supervised.fit import card_of, print_end, show_each
 from care_sim.training.supervised.options import TunedPlaceConfig
 
 DETECTOR = "centerpoint"
-"""The detector whose recall says what a return is worth."""
+"""The detector whose recall values returns."""
 MOST_SHARE = 0.35
-"""The share of the cells that are put in order; the others follow as the pattern `rows` has them.
-No budget of the comparison is larger than 20%."""
+"""Share of the cells in tuned order; the others follow in the order of `rows`. No compared budget
+is larger than 20%.
+"""
 MOST_RETURNS = 256
-"""More returns on an object add nothing."""
+"""Largest number of returns that counts."""
 _PEOPLE = [CLASSES.index(name) for name in PEOPLE]
 
 
 class Frames(NamedTuple):
-    """Objects at keyframes (o,): the cells (c,) that return from each, one object after the other,
-    with the `sizes` (o,); and of each its row in the table of chances and its `counts` (o, 4).
+    """Objects at keyframes (o,). The cells (c,) that return from each are concatenated, with
+    `sizes` (o,). Each object has a row in the table of chances and `counts` (o, 4).
     """
 
     cells: Integers
@@ -49,10 +50,10 @@ class Frames(NamedTuple):
 
 
 def train_tuned_place(config: TunedPlaceConfig) -> int:
-    """Make the map and write it; returns the exit code of the command."""
+    """Make and write the map, and return the exit code of the command."""
     check_output(config.out, ZIP)
     started = time.perf_counter()
-    seeds = one_by_one(range(TRAINING, TRAINING + config.streets), "training street")
+    seeds = show_each(range(TRAINING, TRAINING + config.streets), "training street")
     frames = joined(frames_of(street_film(seed)) for seed in seeds)
     grid = AngularGrid()
     order, shares = tuned_order(frames, chance_table(), grid.size)
@@ -71,7 +72,7 @@ def train_tuned_place(config: TunedPlaceConfig) -> int:
 
 
 def frames_of(film: Film) -> Frames:
-    """The objects of a film within the range that is scored, at every keyframe."""
+    """Return the objects of a film within the scored range, at every keyframe."""
     annotated = [shot.annotations for shot in film.shots]
     sightings = Sightings.of(film.name, annotated, hidden=film.hidden)
     table = sightings.frames
@@ -87,7 +88,7 @@ def frames_of(film: Film) -> Frames:
 
 
 def _cells_by_row(film: Film, keyframes: Integers, objects: Integers) -> Iterator[Integers]:
-    """The cells that return from each object at its keyframe; `keyframes` ascend."""
+    """Return the cells that return from each object at its keyframe; `keyframes` ascend."""
     for keyframe, shot in enumerate(film.shots):
         cloud = shot.cloud.to_shots()
         for number in objects[keyframes == keyframe]:
@@ -95,13 +96,13 @@ def _cells_by_row(film: Film, keyframes: Integers, objects: Integers) -> Iterato
 
 
 def joined(parts: Iterable[Frames]) -> Frames:
-    """The objects of all parts."""
+    """Join the objects of all parts."""
     return Frames(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
 def chance_table() -> Floats:
-    """(2 * classes, MOST_RETURNS + 1) the chance that the detector reports an object of a class
-    with 0, 1, 2, ... returns: seen before, and in its first keyframe.
+    """Return (2 * classes, MOST_RETURNS + 1) the detection chance of an object of a class with 0,
+    1, 2, ... returns: seen before, and in its first keyframe.
     """
     rule, returns = measured_rule(DETECTOR, {}), np.arange(MOST_RETURNS + 1.0)
     table = np.zeros((2 * len(CLASSES), len(returns)))
@@ -112,9 +113,9 @@ def chance_table() -> Floats:
 
 
 def tuned_order(frames: Frames, chances: Floats, size: int) -> tuple[Integers, Floats]:
-    """The cells of a grid of `size` cells, the next one always that which adds most to the four
-    counts, each as a share of a full scan's, up to `ENOUGH` of it; and the shares (4,) that the
-    first tenth of the grid reaches.
+    """Order the cells of a grid of `size` cells greedily, and return the shares (4,) of the grid's
+    first tenth. Each cell adds most to the four counts, which are shares of a full scan's, up to
+    `ENOUGH`.
     """
     full = np.array(
         [
@@ -122,7 +123,7 @@ def tuned_order(frames: Frames, chances: Floats, size: int) -> tuple[Integers, F
             for n in range(frames.counts.shape[1])
         ]
     )
-    # A count of which a full scan has nothing weighs nothing.
+    # A count that is 0 for a full scan has no weight.
     weights = np.divide(1.0, full, out=np.zeros_like(full), where=full > 0)
     hits = _Hits.of(frames, size)
     most = round(MOST_SHARE * size)
@@ -131,8 +132,8 @@ def tuned_order(frames: Frames, chances: Floats, size: int) -> tuple[Integers, F
 
 
 class _Hits(NamedTuple):
-    """Which cell returns from which object: those of object o are cells[starts[o] : starts[o + 1]],
-    those of cell c owners[bounds[c] : bounds[c + 1]].
+    """Returns by object and by cell: object o has cells[starts[o] : starts[o + 1]], cell c has
+    owners[bounds[c] : bounds[c + 1]].
     """
 
     cells: Integers
@@ -153,7 +154,7 @@ class _Hits(NamedTuple):
 def _greedy(
     hits: _Hits, rows: Integers, chances: Floats, counts: Floats, most: int
 ) -> tuple[Integers, Floats]:
-    """The first `most` cells in their order, and the shares (most, 4) of the counts after each."""
+    """Return the first `most` cells in order, and the shares (most, 4) of the counts after each."""
     returns = np.zeros(len(rows), np.int64)
     wanted = np.ones(counts.shape[1])
     order = np.empty(most, np.int64)
@@ -175,8 +176,8 @@ def _greedy(
         worth[best] = -np.inf
         shares[n] = reached
 
-        # A count that has enough is no longer wanted. Once every one has, all are again, and the
-        # rest of the map adds to all of them.
+        # A count that has enough is ignored. Once every count has enough, the rest of the map adds
+        # to all of them.
         still = (reached < ENOUGH) & is_there
         if not has_enough and (still != (wanted > 0)).any():
             has_enough = not still.any()
@@ -190,8 +191,8 @@ def _greedy(
 def _worth(
     hits: _Hits, rows: Integers, chances: Floats, weights: Floats, returns: Integers
 ) -> Floats:
-    """(N,) what one more return in each cell adds, where objects (o,) have `weights` and have had
-    `returns`.
+    """Return (N,) the gain of one more return in each cell, for objects (o,) with `weights` and
+    `returns` so far.
     """
     worth = np.zeros(len(hits.bounds) - 1)
     for o in range(len(rows)):
@@ -203,9 +204,7 @@ def _worth(
 
 @compiled()
 def _gains(chances: Floats, returns: int) -> tuple[float, float]:
-    """What the next return adds to the chance of an object with so many, and what the one after
-    that.
-    """
+    """Return how much the next return, and the one after it, adds to the chance of an object."""
     last = len(chances) - 1
     one, two, three = min(returns, last), min(returns + 1, last), min(returns + 2, last)
     return chances[two] - chances[one], chances[three] - chances[two]

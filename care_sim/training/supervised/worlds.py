@@ -1,12 +1,12 @@
-"""Worlds that differ, and what is true in them: for learners that are told what cells would find.
+"""Drawn worlds with their truth, for supervised learning of cells.
 
-Truth is used here, at training, and nowhere else.
+Truth is used only here, in training.
 
 A play is one street, drive or test of Euro NCAP under a seed, or one scene of a source. Its budget
-is drawn between 0.5 and 20%, evenly by its logarithm, then the faults of its camera: blind in 12%
-of the plays, faultless in 40%, else it misses, invents or is late. Keyframes of a drive or a test
-come 0.1 to 0.5 s apart. A film is played with all cameras and with the front one alone: the closed
-loop has no other.
+is drawn between 0.5 and 20%, uniformly by its logarithm. Then come camera faults: blind in 12% of
+the plays, faultless in 40%, otherwise misses, false boxes or delays. Keyframes of a drive or a test
+are 0.1 to 0.5 s apart. A film is played with all cameras and with only the front one, the closed
+loop's only camera.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -46,18 +46,18 @@ class Present(NamedTuple):
     """Objects at the coming keyframe. Truth."""
 
     objects: Integers
-    """(n,) those that perception reports; in the closed loop an object is a body."""
+    """(n,) objects that perception reports; in the closed loop an object is a body."""
     boxes: Floats
-    """(n, 7) theirs, in the sensor frame."""
+    """(n, 7) their boxes, in the sensor frame."""
     cells: Cells
-    """(m,) of the returns that a full scan would have."""
+    """(m,) cells of a full scan's returns."""
     behind: Integers
-    """(m,) the object that each is of, below 0 for none."""
+    """(m,) the object of each return, below 0 for none."""
 
 
 class World(NamedTuple):
-    """World to learn from: the street, drive or test of a seed, or with a `film` the scene of a
-    source that it makes. A `share` of its keyframes can become examples.
+    """A training world: the street, drive or test of a seed, or, with a `film`, a source's scene
+    that the function makes. A `share` of its keyframes can become examples.
     """
 
     kind: str
@@ -67,15 +67,15 @@ class World(NamedTuple):
 
 
 def generated_worlds(worlds: Mapping[str, int], first: int) -> list[World]:
-    """So many worlds of each kind, with seeds from the first on."""
+    """Return this many worlds of each kind, with seeds from the first on."""
     return [
         World(kind, seed) for kind, count in worlds.items() for seed in range(first, first + count)
     ]
 
 
 def plays(world: World, rng: np.random.Generator, faulty: bool = True) -> Iterator[AnyEnv]:
-    """The plays of a world, one open at a time, not yet reset. Without `faulty` the camera has no
-    fault.
+    """Yield the plays of a world, one open at a time, before `reset`. With `faulty=False` the
+    camera has no fault.
     """
     if world.film:
         return _film(world.film(), rng, faulty)
@@ -96,7 +96,7 @@ def keyframes(env: AnyEnv, policy: Policy, seed: int) -> Iterator[Belief]:
 
 
 def kept(env: AnyEnv, rng: np.random.Generator, share: float = 1.0) -> bool:
-    """Whether a keyframe becomes an example."""
+    """Draw whether a keyframe becomes an example."""
     return bool(rng.random() < KEPT_PER_S * env.rig.keyframe_s * share)
 
 
@@ -112,12 +112,12 @@ def present(loop: OpenLoop | OneWorld) -> Present:
 
 
 def front_alone(film: Film) -> Film:
-    """The film as a car with its first camera alone would have it."""
+    """Return the film with only its first camera."""
     return replace(film, cameras=film.cameras[:1], shots=tuple(map(_first_camera, film.shots)))
 
 
 def views_of(film: Film) -> tuple[Film, ...]:
-    """The film, and where it has several cameras that of the first one alone."""
+    """Return the film and, if it has several cameras, the film with only the first."""
     return (film, front_alone(film)) if len(film.cameras) > 1 else (film,)
 
 

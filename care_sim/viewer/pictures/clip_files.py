@@ -14,11 +14,9 @@ from care_sim.base.extras import import_extra
 from care_sim.base.files import GIF, MP4, PNG, WEBP, check_output, replacing, why_unwritable
 
 _FFMPEG = "imageio_ffmpeg", "A film as MP4", "video"
-"""FFmpeg, as imageio-ffmpeg brings it, and the extra to install."""
+"""FFmpeg from imageio-ffmpeg, and the extra to install."""
 _GIF_COLOURS = 96
-"""Colours of a GIF, the same in all of its pictures: enough for flat surfaces, and the file is half
-as large.
-"""
+"""Colours of a GIF, shared by all its pictures: enough for flat surfaces, at half the size."""
 
 
 def check_clip(path: Path) -> None:
@@ -47,7 +45,8 @@ def write_clip(
 def _write_mp4(
     path: Path, pictures: Iterable[Image.Image], picture_s: float, hold_s: float
 ) -> None:
-    # FFmpeg is told the size of the pictures first, so that the first of them is taken out.
+    # FFmpeg needs the size of the pictures first, so the first picture is read before the writer
+    # opens.
     shown = iter(pictures)
     first = next(shown)
     ffmpeg = import_extra(*_FFMPEG)
@@ -64,14 +63,14 @@ def _write_mp4(
             for picture in chain([first], shown):
                 film.send(picture.tobytes())
                 sent += 1
-            # A film has one rate for all pictures: to hold the last is to repeat it.
+            # A film has one rate for all pictures, so the last picture is held by repeating it.
             for _ in range(round(hold_s / picture_s) - 1):
                 film.send(picture.tobytes())
                 sent += 1
         written, _ = ffmpeg.count_frames_and_secs(str(path))
     except (OSError, RuntimeError):
         written = 0
-    # FFmpeg does not report that it failed, but its film then lacks pictures.
+    # FFmpeg reports no failure, but its film then lacks pictures.
     if written != sent:
         raise OSError(errno.EIO, why_unwritable(path) or "FFmpeg could not write it", str(path))
 
@@ -91,7 +90,7 @@ def _write_gif(
 
 
 def _in_few_colours(pictures: Sequence[Image.Image]) -> list[Image.Image]:
-    """The pictures in one palette, the best for a dozen of them."""
+    """Return the pictures in one palette, chosen for a dozen of them."""
     sample = np.concatenate(
         [np.asarray(picture) for picture in pictures[:: max(1, len(pictures) // 12)]]
     )

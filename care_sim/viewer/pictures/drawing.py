@@ -24,7 +24,7 @@ def write(
     colour: palette.Colour = palette.INK,
     anchor: str = "la",
 ) -> None:
-    """Text with its `anchor` at a pixel."""
+    """Write text with its `anchor` at a pixel."""
     draw.text(at, text, colour, font(size), anchor=anchor)
 
 
@@ -36,7 +36,7 @@ def plate(
     size: int,
     anchor: str = "mm",
 ) -> None:
-    """Text in the background's colour on a plate of `colour`, its `anchor` at a pixel."""
+    """Write text in the background's colour on a plate of `colour`, its `anchor` at a pixel."""
     left, top, right, bottom = draw.textbbox(at, text, font(size), anchor=anchor)
     draw.rounded_rectangle((left - 10, top - 8, right + 10, bottom + 8), 7, colour)
     write(draw, at, text, size, palette.BACKGROUND, anchor)
@@ -59,7 +59,7 @@ def wireframe(
     colour: palette.Colour,
     width: int,
 ) -> None:
-    """The edges of a sensor-frame box (7,) that lie wholly before the camera."""
+    """Draw the edges of a sensor-frame box (7,) that lie wholly before the camera."""
     pixels, depth = camera.project(box_corners(box[None])[0])
     for start, end in BOX_EDGES:
         if min(depth[start], depth[end]) > NEAR_M:
@@ -67,15 +67,17 @@ def wireframe(
 
 
 def point_above(camera: PinholeCamera, box: Floats) -> tuple[float, float] | None:
-    """The pixel of the middle of a box's roof; None behind the camera or outside the picture."""
+    """Return the pixel of the middle of a box's roof; None behind the camera or outside the
+    picture.
+    """
     (pixel,), (depth,) = camera.project([[box[0], box[1], box[2] + box[5] / 2]])
     inside = depth > NEAR_M and 0 <= pixel[0] < camera.width and 0 <= pixel[1] < camera.height
     return (float(pixel[0]), float(pixel[1])) if inside else None
 
 
 def cells_picture(colours: NDArray[np.uint8], size: tuple[int, int]) -> Image.Image:
-    """Cells with colours (E, n, 3) as the car sees them: its left is left. They stay sharp where
-    they grow to `size`, and are averaged where several share a pixel.
+    """Return the picture of cells with colours (E, n, 3), the car's left on the left. Enlarged
+    cells stay sharp; cells that share a pixel are averaged.
     """
     # Columns run counter-clockwise, so that the right comes first.
     picture = Image.fromarray(np.ascontiguousarray(colours[:, ::-1]))
@@ -85,7 +87,7 @@ def cells_picture(colours: NDArray[np.uint8], size: tuple[int, int]) -> Image.Im
 
 
 def scan_colours(grid: Grid, ranges: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """(E, n, 3) colours of the cells of a scan (E, n), by range."""
+    """Return (E, n, 3) colours of the cells of a scan (E, n), by range."""
     colours = np.full((*ranges.shape, 3), palette.NOT_FIRED_COLOUR, np.uint8)
     fired = ranges > 0
     returned = fired & (ranges < grid.range_m)
@@ -95,7 +97,7 @@ def scan_colours(grid: Grid, ranges: NDArray[np.floating]) -> NDArray[np.uint8]:
 
 
 def range_colours(shares: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """(..., 3) colours of ranges that are given as shares of the reach: near is bright."""
+    """Return (..., 3) colours of ranges, given as shares of the reach: near is bright."""
     from matplotlib import colormaps
 
     # The ends of the scale are left out: they are too close to the background and to white.

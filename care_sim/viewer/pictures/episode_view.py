@@ -30,21 +30,21 @@ from care_sim.world.bullet import BulletWorld
 from care_sim.world.world import Actor
 
 _ROW_HEIGHT = 140
-"""Of a row of cameras with its words, pixels."""
+"""Height of a row of cameras with its words, pixels."""
 _ALONE_SIZE = (352, 180)
-"""Of the picture of a single camera, at the most: the grid is drawn beside it."""
+"""Largest size of a single camera's picture, which leaves room for the grid beside it."""
 PICTURES_TOP = 30
 _BEHIND_RAD = np.deg2rad(170.0)
 _AHEAD_RAD = np.deg2rad(10.0)
 
 
 def cameras_picture(scene: BulletWorld, loop: OneWorld) -> Image.Image:
-    """Draw every camera's view with its detections: those that a forecast explains in one colour,
-    the others in another, and in a third, crossed out, those that show nothing.
+    """Draw every camera's view with its detections: explained and unexplained ones in two colours,
+    false ones crossed out in a third.
 
     The picture of a single camera is as large as the camera's, within a picture of `BELOW_SIZE`,
-    and the classes stand beside the boxes. Several share the width of a whole picture and have no
-    room for words. They come in the sequence of the grid's columns in a picture: behind, left,
+    and the classes stand beside the boxes. Several cameras share the width of a whole picture and
+    have no room for words. They come in the order of the grid's columns in a picture: behind, left,
     ahead, right.
     """
     cameras = loop.rig.cameras
@@ -65,7 +65,7 @@ def cameras_picture(scene: BulletWorld, loop: OneWorld) -> Image.Image:
         canvas.paste(_picture(scene, loop, 0, round(scale * camera.width)), (20, PICTURES_TOP))
         return canvas
     share = PICTURE_WIDTH // len(cameras)
-    # By where they look.
+    # Ordered by viewing direction.
     from_left = sorted(range(len(cameras)), key=lambda number: -cameras[number].yaw)
     for place, number in enumerate(from_left):
         picture = _picture(scene, loop, number, share)
@@ -113,7 +113,7 @@ def _towards(yaw: float) -> str:
 CHASE_CAMERA = PinholeCamera(
     PICTURE_WIDTH, 460, np.deg2rad(80.0), (-10.0, 0.0, 3.6), 0.0, np.deg2rad(-16.0)
 )
-"""Behind the car and above it, in the frame of the LiDAR; low enough for a strip of sky."""
+"""View point behind and above the car, in the frame of the LiDAR, low enough for a strip of sky."""
 _PANEL_CAMERA = PinholeCamera(
     PANEL_WIDTH, 320, np.deg2rad(52.0), (-11.0, 0.0, 3.8), 0.0, np.deg2rad(-11.0)
 )
@@ -121,11 +121,11 @@ BOXES_MEAN = "boxes: tracks, faint when the last scan missed them"
 
 
 def episode_view(loop: OneWorld, frames: Sequence[Keyframe]) -> View:
-    """The present state of `loop` after the keyframes `frames`, and the scan of the last of them.
+    """Return the view of `loop` after the keyframes `frames`, with the last scan.
 
-    The street has tracks as wireframes, arrows at whom the episode is about and at whom the car
-    hit, and on the ground the strip the controller guards. Below are the cameras with their
-    detections. The episode is left as it was.
+    The street shows tracks as wireframes, arrows at the first-sighting actor and at actors that the
+    car hit, and on the ground the strip that the controller guards. Below are the cameras with
+    their detections. The episode is left as it was.
     """
     frame = frames[-1] if frames else None
     return View(
@@ -152,7 +152,7 @@ def _clearance(loop: OneWorld, frame: Keyframe) -> str:
 
 
 def verdict(frames: Sequence[Keyframe], keyframe_s: float) -> State:
-    """Whether the first-sighting actor is detected so far, since when and how far away."""
+    """Return whether the first-sighting actor is detected so far, since when and how far away."""
     seen = next((frame.time_s for frame in frames if frame.in_view), None)
     found = next((frame.time_s for frame in frames if frame.detected), None)
     if found is None:
@@ -188,8 +188,8 @@ def _scenery(loop: OneWorld, frame: Keyframe | None, whole: bool) -> Scenery:
 def _mark_street(
     street: Image.Image, camera: PinholeCamera, loop: OneWorld, frame: Keyframe | None
 ) -> Labels:
-    """Tracks as wireframes with their classes, those that the last scan missed faint, arrows at
-    whom the episode is about, and in a corner what the boxes mean. Gives the labels, for more.
+    """Draw tracks as wireframes with their classes (faint if the last scan missed them), arrows at
+    the actors of the episode, and a legend of the boxes. Returns the labels.
     """
     draw, tracks = ImageDraw.Draw(street), loop.belief.tracks
     marks = [
@@ -205,8 +205,8 @@ def _mark_street(
     for box, _, misses, colour in reversed(marks):
         drawing.wireframe(draw, camera, box, colour, 1 if misses else 2)
     labels = Labels(draw)
-    mark_sought(labels, camera, loop, frame)
-    # Before the tracks, whose names leave room for it.
+    mark_actors(labels, camera, loop, frame)
+    # Draw the legend before the tracks, so that their names leave room for it.
     labels.over((0, street.height), BOXES_MEAN, palette.EXPLAINED_COLOUR)
     for box, name, _, colour in marks:
         if at := drawing.point_above(camera, box):
@@ -214,13 +214,12 @@ def _mark_street(
     return labels
 
 
-def mark_sought(
+def mark_actors(
     labels: Labels, camera: PinholeCamera, loop: OneWorld, frame: Keyframe | None
 ) -> None:
-    """An arrow at everybody whom the episode is about, and at whom the car hit.
-
-    Whom a drive lets the ego meet has one within the range of the LiDAR: further down the street
-    arrows would lie on one another. `frame` is the keyframe before, None before the first.
+    """Draw an arrow at every actor of the episode, and at actors that the car hit. Actors that a
+    drive lets the ego meet get an arrow only within the range of the LiDAR, since far arrows would
+    overlap. `frame` is the keyframe before, None before the first.
     """
     actors = sought(loop.world)
     hit = _hit_actor(loop, frame)
@@ -236,8 +235,8 @@ def mark_sought(
 
 
 def contact_text(loop: OneWorld, frame: Keyframe) -> str | None:
-    """Whom the car hit in a keyframe, and how fast it was, or who hit the car; None without a
-    contact.
+    """Return the text of a contact in a keyframe: the actor that the car hit and its speed, or the
+    actor that hit the car. None without a contact.
     """
     hit = _hit_actor(loop, frame)
     if hit is None or frame.impact is None:

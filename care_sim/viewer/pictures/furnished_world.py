@@ -1,6 +1,5 @@
-"""A copy of the world for pictures that people look at, with ground, the car and marks on its path.
-
-The world of the episode is not touched.
+"""A copy of the world for pictures, with ground, the car and marks on its path. The world of the
+episode is not touched.
 """
 
 from collections.abc import Iterator
@@ -22,12 +21,14 @@ METRE_MARKS = (10.0, 20.0, 30.0, 40.0)
 
 BENDING_PIECES = 40
 OVERLAP = 1.3
-"""A path that may bend is laid in so many pieces, each longer by this factor than its share: no
-cracks show on the outside of a bend.
+"""Pieces of a bending path, and the factor of their length against cracks on the outside of a
+bend.
 """
 
 _REACH_M = 110.0
-"""What is further from the car is a few pixels high and left out: every body costs time."""
+"""Distance beyond which bodies are left out: they are a few pixels high, and every body costs
+time.
+"""
 
 _ASPHALT = (0.36, 0.36, 0.38)
 _PATH = (0.47, 0.47, 0.5)
@@ -37,13 +38,13 @@ _SKY = (128, 147, 166)
 _ROAD = (85, 85, 90)
 """The asphalt, as it is painted."""
 _NOTHING = 255
-"""What the renderer paints where no body is."""
+"""Colour that the renderer paints where no body is."""
 
 
 @contextmanager
 def furnished(world: World) -> Iterator[BulletWorld]:
-    """A simulator with every actor within sight at its present pose and an asphalt ground; freed at
-    the end.
+    """Yield a simulator with every actor in sight at its present pose and an asphalt ground; freed
+    at the end.
     """
     scene = BulletWorld()
     try:
@@ -81,7 +82,7 @@ def add_car(scene: BulletWorld, world: World, sensor_x: float, guarded_m: float)
     `sensor_x` is the place of the LiDAR ahead of the car's centre, `guarded_m` the strip's width,
     metres.
     """
-    # Path and bars stand 2 cm over what is below them, so that they are what is seen.
+    # Path and bars are 2 cm above what is below them, so that they are visible.
     reach = METRE_MARKS[-1]
     pieces = 1 if world.route is None else BENDING_PIECES
     length = reach / pieces

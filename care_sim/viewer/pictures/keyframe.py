@@ -1,5 +1,5 @@
-"""The picture of a keyframe of either loop: the street, the angular grid, a line of text; and the
-narrow one that is shown beside those of other policies.
+"""The picture of a keyframe of either loop: the street, the angular grid, a line of text. Also the
+narrow panel beside those of other policies.
 """
 
 from collections.abc import Callable
@@ -26,16 +26,16 @@ from care_sim.viewer.pictures.drawing import (
 
 PICTURE_WIDTH = 960
 PANEL_WIDTH = 512
-"""Of a picture that is shown beside others."""
+"""Width of a panel."""
 BELOW_SIZE = (392, 220)
-"""Of what is below the street, to the left of the grid."""
+"""Size of the picture below the street, to the left of the grid."""
 STREET_TOP = 40
 CELLS_TOP = 30
-"""Pixels from the top of the picture of a grid to its cells; its words are above them."""
+"""Pixels from the top of a grid's picture to its cells; words are above them."""
 CELLS_SIZE = (512, 128)
-"""Of the cells of any grid: four pixels a row for the paper's."""
+"""Height of the cells of any grid: four pixels a row for the paper's."""
 _NAMES_HEIGHT = 22
-"""Of the names of directions between the pictures of two LiDARs."""
+"""Height of the names of directions between the pictures of two LiDARs."""
 _GRID_HEIGHT = CELLS_TOP + CELLS_SIZE[1] + _NAMES_HEIGHT + 20
 _LINE_HEIGHT = 30
 _DIRECTIONS = {
@@ -44,7 +44,7 @@ _DIRECTIONS = {
     "ahead": 0.0,
     "right": -np.pi / 2,
 }
-"""Azimuths that are named below the grid."""
+"""Azimuths named below the grid."""
 
 
 class Scenery(NamedTuple):
@@ -64,21 +64,21 @@ class View:
     time_s: float
     """Seconds from the start."""
     progress: str
-    """How far the episode is: the speed of the car, or how many objects are found."""
+    """State of the episode: the speed of the car, or the number of detected objects."""
     braking: bool
     contact: str | None
-    """Whom the car has hit."""
+    """Text of a collision."""
     aside: str
-    """What a picture tells besides, where nobody is hit."""
+    """Further text of a picture without a collision."""
     verdict: palette.State
-    """What a panel tells, where nobody is hit."""
+    """Text of a panel without a collision."""
     fired: Cells | None
     """(n,) the cells that fired, each as often as it was fired."""
     ranges: NDArray[np.floating]
     """(E, A) the scan in metres: 0 not fired, maximum range without a return."""
     shares: NDArray[np.uint8] | None
     """(E, A) each cell's share of the budget, a place in `care_sim.core.firing.actions.SHARES`.
-    They colour the cells; without them the ranges do.
+    Shares colour the cells; without them ranges do.
     """
     is_moment: bool
     """Whether a picture of the episode is of this keyframe: the car brakes, or somebody appears."""
@@ -87,14 +87,14 @@ class View:
 
 
 def draw_keyframe(view: View) -> Image.Image:
-    """A picture, `PICTURE_WIDTH` x 720 pixels, or 860 where several cameras take a row.
+    """Draw a picture, `PICTURE_WIDTH` x 720 pixels, or 860 where several cameras take a row.
 
-    Above, the street; below, what belongs to it and the cells that fired, in the colours of their
-    shares of the budget where these are known, else coloured by range.
+    The street is above. Below are its pictures and the fired cells, coloured by share of the budget
+    if known, else by range.
     """
     street, below = view.scenery(True)
     assert below is not None
-    # What is as wide as the picture takes a row of its own; the grid lies below it, in the middle.
+    # A scenery as wide as the picture takes its own row; the grid is below it, in the middle.
     row = below.width == PICTURE_WIDTH
     top = STREET_TOP + street.height
     left = (PICTURE_WIDTH - CELLS_SIZE[0]) // 2 if row else BELOW_SIZE[0]
@@ -113,10 +113,8 @@ def draw_keyframe(view: View) -> Image.Image:
 
 
 def draw_panel(name: str, view: View) -> Image.Image:
-    """A picture, `PANEL_WIDTH` pixels wide, to be shown beside those of other policies, under the
-    heading `name`.
-
-    Above, the street, then the cells that fired, and what has been detected so far.
+    """Draw a panel, `PANEL_WIDTH` pixels wide, headed `name`, to stand beside those of other
+    policies. It shows the street, then the fired cells, and the detections so far.
     """
     street, _ = view.scenery(False)
     below = STREET_TOP + street.height
@@ -135,7 +133,7 @@ def draw_panel(name: str, view: View) -> Image.Image:
 def _canvas(
     width: int, height: int, view: View, brake_x: int
 ) -> tuple[Image.Image, ImageDraw.ImageDraw]:
-    """An empty picture that says whether the car brakes."""
+    """Return an empty picture that shows whether the car brakes."""
     canvas = Image.new("RGB", (width, height), palette.BACKGROUND)
     draw = ImageDraw.Draw(canvas)
     if view.braking:
@@ -144,8 +142,8 @@ def _canvas(
 
 
 def _draw_grid(canvas: Image.Image, at: tuple[int, int], view: View) -> None:
-    """The angular grid with a scan, its left and top words `at` a pixel of a picture, its
-    directions and a legend of its colours.
+    """Draw the angular grid with a scan, its left top corner `at` a pixel, its directions and a
+    legend of its colours.
     """
     grid, draw = view.rig.grid, ImageDraw.Draw(canvas)
     write(draw, (at[0] + 2, at[1] + 8), _grid_words(view), 14)
@@ -154,7 +152,7 @@ def _draw_grid(canvas: Image.Image, at: tuple[int, int], view: View) -> None:
         _write_ranges(canvas, (at[0], top), grid.range_m)
         return
     x, top = at[0], draw_cells(canvas, at, grid, palette.SHARE_COLOURS[view.shares])
-    # The shares that there are, and how many shots each paid for.
+    # The shares present, and the number of shots of each.
     paid = np.bincount(view.shares.ravel()[view.fired], minlength=len(SHARES))
     for share in np.flatnonzero(paid).tolist():
         colour = tuple(palette.SHARE_COLOURS[share].tolist())
@@ -178,8 +176,8 @@ def _grid_words(view: View) -> str:
 def draw_cells(
     canvas: Image.Image, at: tuple[int, int], grid: Grid, colours: NDArray[np.uint8]
 ) -> int:
-    """The cells in their colours (E, A, 3) with their directions, `CELLS_TOP` pixels below `at`;
-    those of several LiDARs one below the other. Gives the pixel row where more may begin.
+    """Draw the cells in their colours (E, A, 3) with their directions, `CELLS_TOP` pixels below
+    `at`. Several LiDARs are stacked. Returns the next free pixel row.
     """
     left, top = at
     draw = ImageDraw.Draw(canvas)

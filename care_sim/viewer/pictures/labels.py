@@ -1,4 +1,4 @@
-"""Words in pictures, none of which lies over another."""
+"""Labels in pictures, without overlap."""
 
 from PIL import ImageDraw
 
@@ -9,16 +9,16 @@ _Area = tuple[float, float, float, float]
 """Left, top, right, bottom, pixels."""
 _MARGIN = 3
 _FURTHEST = 2.5
-"""Heights of a label that it may move up: further away nobody sees whose it is."""
+"""Heights that a label may move up: farther away its object is unclear."""
 _SHAFT = 34
 """Length of an arrow over its head, pixels."""
 
 
 class Labels:
-    """The words of one picture, put down after its boxes, so that no box covers them.
+    """The labels of one picture, drawn after its boxes, so that no box covers them.
 
-    What comes first keeps its place. A later one moves up past what is in its way, and is left out
-    where there is no room close above.
+    Earlier labels keep their place. A later label moves up past them, and is left out if there is
+    no room close above.
     """
 
     def __init__(self, draw: ImageDraw.ImageDraw):
@@ -26,8 +26,8 @@ class Labels:
         self._taken: list[_Area] = []
 
     def over(self, at: tuple[float, float], text: str, colour: Colour, size: int = 13) -> None:
-        """Text centred over a point, on a dark plate, kept inside the picture; a text that the
-        picture cannot hold is left out.
+        """Write text centred over a point, on a dark plate, kept inside the picture. A text that
+        does not fit is left out.
         """
         width, height = self._plate(text, size)
         canvas = self._draw.im.size
@@ -37,14 +37,16 @@ class Labels:
             self._write(area, text, colour, size)
 
     def beside(self, at: tuple[float, float], text: str, colour: Colour, size: int) -> None:
-        """Text that ends at a point, where there is room: a number stays at its value."""
+        """Write text that ends at a point, if there is room. It does not move: a number stays at
+        its value.
+        """
         width, height = self._plate(text, size)
         area = at[0] - width, at[1] - height / 2, at[0], at[1] + height / 2
         if not any(_overlap(area, other) for other in self._taken):
             self._write(area, text, colour, size)
 
     def arrow(self, tip: tuple[float, float], text: str, colour: Colour) -> None:
-        """An arrow that points down at the label of `tip`, with a text of its own over it."""
+        """Draw an arrow that points down at the label of `tip`, with its own text above."""
         x, y = tip[0], tip[1] - 20
         self.over((x, y - _SHAFT - 2), text, colour, 15)
         self._draw.line((x, y - _SHAFT, x, y - 8), colour, 4)

@@ -1,5 +1,5 @@
-"""Pictures of the open loop: the scene from above, the car driving to the right, with who is found,
-and if it is known what the policy knew.
+"""Pictures of the open loop: the scene from above, the car driving to the right, with detections
+and, if known, the policy's knowledge.
 """
 
 from collections.abc import Sequence
@@ -28,18 +28,18 @@ _RINGS = (10.0, 20.0, 30.0, 40.0, RANGE_M)
 """Radii of the range rings, metres."""
 _CAR = np.array([0.0, 0.0, 0.0, *CATALOGUE["ego"].size, 0.0])
 _AROUND = np.array([0.0, 0.0, 0.0, 1.8, 1.8, 0.0, 0.0])
-"""What a box gains in length and width for its second line."""
+"""Added length and width of a box's second line."""
 _RING_COLOUR = (52, 56, 63)
 RETURN_COLOUR = (172, 176, 184)
 TRACK_COLOUR = (205, 160, 255)
 _AHEAD_S = 1.0
-"""For how long the line of a forecast shows where it goes."""
+"""Duration of the motion that a forecast's line shows."""
 _DOT = 3
 """Radius of a forecast, pixels."""
 _CLEAR = 10
 """Pixels from the middle of a box to its name."""
 _DIMMED = 0.45
-"""What is left of the colour of a wedge: a scene has many of them."""
+"""Opacity of a wedge, low since a scene has many."""
 _SIDES = [7, 8]
 """Among the rays of an image box, those through the points of its left and right edge where its
 azimuth is extreme.
@@ -66,13 +66,14 @@ _KNOWN = (
 def scene_view(
     loop: OpenLoop, frames: Sequence[SceneKeyframe], watched: Watched | None = None
 ) -> View:
-    """The last of the keyframes `frames`, which `loop` has just played, or is about to play first.
+    """Return the view of the last of the keyframes `frames`, which `loop` has just played or plays
+    next.
 
-    The map has the annotated objects, which are found, not found, or beyond the range that is
-    scored; those that appear have a double line. It has the returns of the fired cells. Where the
-    keyframe was `watched`, those that appear have a name, and the map has what was known when the
-    cells were chosen: the forecasts of tracks, and where the camera's detections lie, which have no
-    depth. The episode is left as it was.
+    The map shows annotated objects (detected, undetected, or beyond the scored range) and the
+    returns of fired cells. Appearing objects have a double line. If the keyframe was `watched`,
+    appearing objects have a name. The map then also shows what was known when the cells were
+    chosen: forecasts of tracks, and camera detections, which have no depth. The episode is left as
+    it was.
     """
     last = frames[-1]
     entries = sum(frame.entries for frame in frames)
@@ -154,7 +155,7 @@ class _Map:
             write(self.draw, at, f"{metres:.0f} m", 11, palette.FAINT_INK, "rm")
 
     def draw_returns(self, loop: OpenLoop, watched: Watched | None) -> None:
-        """The returns, in the colours of their shares where these are known."""
+        """Draw the returns, in the colours of their shares if known."""
         cells, points = returned(loop.last_ranges, loop.rig.grid)
         colours = np.full((len(cells), 3), RETURN_COLOUR)
         if watched:
@@ -163,8 +164,8 @@ class _Map:
             self.draw.rectangle((x, y, x + 1, y + 1), tuple(colour))
 
     def draw_objects(self, boxes: Floats, keyframe: SceneKeyframe) -> None:
-        """The car, and the annotated boxes (n, 7) in the colours of how it stands with them; those
-        that appear have a second line.
+        """Draw the car, and the annotated boxes (n, 7) in the colours of their states; appearing
+        ones have a second line.
         """
         self._draw_box(_CAR, palette.INK, 2)
         for row, box in enumerate(boxes):
@@ -174,7 +175,7 @@ class _Map:
                 self._draw_box(box + _AROUND, colour, 1)
 
     def draw_wedges(self, rig: Rig, situation: TrueSituation) -> None:
-        """The rays through the left and right of every image box, as far as objects are scored."""
+        """Draw the rays through the left and right of every image box, up to the scored range."""
         rays = wedge_rays(situation.belief.detections, rig)
         for nine, known, false in zip(rays, situation.known, situation.false, strict=True):
             dimmed = tuple(round(_DIMMED * part) for part in palette.box_colour(known, false))
@@ -183,8 +184,8 @@ class _Map:
                 self.draw.line(line.ravel().tolist(), dimmed)
 
     def draw_tracks(self, situation: TrueSituation) -> None:
-        """A dot at the centre of every forecast, hollow where the last scan missed the track, and a
-        line to where it would be in a second, over ground.
+        """Draw a dot at the centre of every forecast, hollow if the last scan missed the track, and
+        a line to its place a second later, over ground.
         """
         tracks = situation.belief.tracks
         centres = tracks.boxes[:, :2]
@@ -195,8 +196,8 @@ class _Map:
             self.draw.ellipse(dot, None if misses else TRACK_COLOUR, TRACK_COLOUR)
 
     def name_sightings(self, situation: TrueSituation, keyframe: SceneKeyframe) -> None:
-        """Name whoever appears, the nearest first, at a place that stays: a person is a few pixels
-        large. A film has no names: they hide who else is there.
+        """Name appearing objects, the nearest first, at a fixed place, since a person is a few
+        pixels large. Films have no names, which would hide other objects.
         """
         labels = Labels(self.draw)
         boxes = situation.sensor.boxes_to_local(situation.bodies)

@@ -1,7 +1,7 @@
 """Entities of a recording: each with its content, unit and frame."""
 
 ABOUT_ENTITY = "about"
-"""The page that says what a recording holds; every other entity is one of an episode."""
+"""The page about the recording; every other entity belongs to an episode."""
 SECONDS = "seconds"
 """The timeline of the time of the scan."""
 KEYFRAME = "keyframe"
@@ -14,7 +14,9 @@ is wide.
 WEDGE_M = 30.0
 """Length at which a wedge, which has no depth, is drawn."""
 MOST_POINTS = 6000
-"""Of more returns, only every second or third is drawn: full scans would fill 9 MB in 6 s."""
+"""Most returns drawn. Of more, only every second or third is drawn: full scans would fill 9 MB in 6
+s.
+"""
 
 ENTITIES = {
     "world": "axes: x along the road, y left, z up; metres",
@@ -57,7 +59,7 @@ ENTITIES = {
     "events": "what changed, or who appears for the first time, in words",
     "outcome": "the result of the episode, as `info` has it at the end",
 }
-"""Entities of both loops, each below the name of its lane, and what they hold."""
+"""Entities of both loops, each below the name of its lane, and their content."""
 
 _CLOSED_LOOP_ALONE = (
     "world/first_sighting",

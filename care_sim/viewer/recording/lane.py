@@ -37,7 +37,7 @@ class Lane:
 
     def log_list(self, entity: str, count: int, *content: Any) -> None:
         """Log a list of `count` things at the present keyframe."""
-        # An empty list is logged once, to clear what stood there, and then no more.
+        # An empty list is logged once, to clear the view, and then no more.
         if count or self._counts.get(entity) != 0:
             self.log(entity, *content)
         self._counts[entity] = count
@@ -57,7 +57,7 @@ class Lane:
         )
 
     def fix(self, entity: str, *content: Any) -> None:
-        """Log what holds for the whole episode."""
+        """Log something that stays for the whole episode."""
         self._stream.log(entity_path(self.name, entity), *content, static=True)
 
 

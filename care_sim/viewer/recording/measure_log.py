@@ -1,4 +1,4 @@
-"""Logs of curves, states and words: the measures, the budget, what happened when."""
+"""Logs of curves, states and events: measures, budget, and when things happened."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -24,11 +24,11 @@ _STATES = {
 }
 """States of the closed loop with a colour for each of their values."""
 _QUIET = ("off", "out of view")
-"""What an episode begins with is no event, unless it is worth telling."""
+"""Initial states that are not logged as events."""
 
 
 def actor_state(frame: Keyframe) -> palette.State:
-    """How it stands with the first-sighting actor at the scan."""
+    """Return the state of the first-sighting actor at the scan."""
     if frame.detected:
         return palette.DETECTED
     return palette.IN_VIEW if frame.in_view else palette.OUT_OF_VIEW
@@ -62,7 +62,7 @@ class MeasureLog:
             )
 
     def log(self, watched: Watched) -> None:
-        """A keyframe."""
+        """Log a keyframe."""
         record = watched.record
         self._times.append((record.index, record.time_s))
         # A cell that was fired several times was paid for as often.
@@ -100,7 +100,7 @@ class MeasureLog:
             self._measures[name].append(value)
 
     def _change(self, name: str, state: str, words: str) -> None:
-        """A state, and the event that it is when it begins."""
+        """Log a state, and its beginning as an event."""
         before = self._states.get(name)
         if state == before:
             return
@@ -121,7 +121,7 @@ class MeasureLog:
             times = [self._times[n] for n in kept.tolist()]
             self._lane.log_curve(f"measures/{name}", times, values[kept])
         percents = 100 * np.reshape(self._paid, (-1, len(SHARES))) / self._budget
-        # Either a policy's demand tells the shares, or a raw action scored the cells itself.
+        # Shares come from a policy's demand, or from a raw action that scored the cells itself.
         asked = (CHOSEN,) if percents[:, CHOSEN].any() else (EXPLOITATION, RESERVE)
         for share in (*asked, ALONG if percents[:, ALONG].any() else FLOOR):
             self._lane.log_curve(f"budget/{SHARES[share]}", self._times, percents[:, share])

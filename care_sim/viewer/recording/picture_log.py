@@ -1,4 +1,4 @@
-"""Logs of pictures: what the camera shows and detects, and the cells of the grid."""
+"""Logs of pictures: the camera's view and detections, and the cells of the grid."""
 
 from collections.abc import Sequence
 from io import BytesIO
@@ -34,7 +34,7 @@ _OUTLINE_COLOURS = {
     "wedges/residual": palette.UNEXPLAINED_COLOUR,
 }
 _QUALITY = 80
-"""Of a JPEG, out of 100: a recording stays small."""
+"""JPEG quality out of 100, for small recordings."""
 
 
 class PictureLog:
@@ -78,7 +78,7 @@ class PictureLog:
             self._photo = photograph(loop.world.bullet, camera, loop.sensor)
 
     def log(self, watched: Watched) -> None:
-        """A keyframe, with the camera's picture if there is one."""
+        """Log a keyframe, with the camera's picture if there is one."""
         if self._photo is not None:
             self._lane.log(_CAMERA, _encoded(self._photo))
         self._log_detections(watched.situation)
@@ -134,11 +134,11 @@ def _encoded(picture: Image.Image) -> rr.EncodedImage:
 
 
 def outlines(sectors: Sequence[Cells], grid: Grid) -> Floats:
-    """(n, 4: left, top, right, bottom in pixels) boxes around angular rectangles of cells, over the
-    picture of the grid: two for one that lies across the seam of the grid, none for one without
-    cells.
+    """Return boxes around angular rectangles of cells, over the picture of the grid (n, 4: left,
+    top, right, bottom in pixels). A rectangle across the seam of the grid has two boxes, one
+    without cells none.
     """
-    # Of several LiDARs each has a rectangle of its own.
+    # Each LiDAR has its own rectangle.
     parts = [
         cells[grid.lidars_of(cells) == number]
         for cells in sectors

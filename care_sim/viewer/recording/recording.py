@@ -22,9 +22,9 @@ from care_sim.viewer.recording.picture_log import PictureLog
 from care_sim.viewer.recording.space_log import SpaceLog
 
 _EYE_M = (-11.0, 0.0, 6.0)
-"""Where the chase view looks from: behind the car and above it, in the sensor frame."""
+"""View point of the chase view: behind and above the car, in the sensor frame."""
 _TARGET_M = (12.0, 0.0, -1.0)
-"""Where it looks to."""
+"""Target of the chase view."""
 _CLOSED_LOOP = {
     "Who is seen, who brakes": (rrb.StateTimelineView, "states/**"),
     "Speed, m/s": (rrb.TimeSeriesView, "measures/speed"),
@@ -33,7 +33,7 @@ _CLOSED_LOOP = {
 _OPEN_LOOP = {
     "Objects within 50 m, and found": (rrb.TimeSeriesView, "measures/objects", "measures/found")
 }
-"""Views of the curves and states, by their titles: their kinds, and what they show of each lane."""
+"""Views of the curves and states, by title: kind, and the entities of each lane."""
 _GRID_TITLE = (
     "fired: blue exploitation, orange reserve, grey floor, green chosen by a raw action, purple "
     "along in a window"
@@ -127,9 +127,9 @@ def _without_settings() -> Iterator[None]:
 
 
 class Recording(AbstractContextManager["Recording"]):
-    """Writes `path` when it is closed; `lanes` are the names of the episodes that will be in it,
-    all of the closed loop, or of the `open_loop`.
-    Until then all is held in memory: 1 to 9 MB per episode.
+    """A recording, which writes `path` when it is closed. `lanes` are the names of its episodes,
+    all of the closed loop, or all of the `open_loop`. Until then everything is held in memory: 1 to
+    9 MB per episode.
 
     Raises InvalidInput for a lane with the name of the page `about`, and as
     `care_sim.base.files.replacing` does.
@@ -145,8 +145,8 @@ class Recording(AbstractContextManager["Recording"]):
         self._unfinished = self._file.enter_context(replacing(path, RERUN))
         with _without_settings():
             self._stream = rr.RecordingStream("care-sim")
-            # Rerun's own writer is a thread. A full disk ends it, and whatever waits for it then
-            # waits for ever: so the recording is held in memory, and written here.
+            # Rerun's own writer is a thread. A full disk ends the thread, and waiting for it would
+            # then never end. So the recording is held in memory, and written here.
             self._memory = self._stream.memory_recording()
             self._stream.send_blueprint(blueprint(self._lanes, open_loop), make_active=False)
         self._file.callback(self._write)
@@ -178,7 +178,7 @@ class RecordedEpisode:
 
     def __init__(self, lane: Lane, loop: OneWorld | OpenLoop, colour: Colour):
         self._lane = lane
-        # A film has no driver, who would guard a strip.
+        # A film has no driver, so no guarded strip.
         guarded_m = loop.guarded_m if isinstance(loop, OneWorld) else 0.0
         self._space = SpaceLog(lane, loop.rig, guarded_m)
         self._pictures = PictureLog(lane, loop)
@@ -196,5 +196,5 @@ class RecordedEpisode:
         self._curves.log(watched)
 
     def end(self, outcome: Mapping[str, Any] | None) -> None:
-        """Log how it ended."""
+        """Log the result."""
         self._curves.end(outcome)

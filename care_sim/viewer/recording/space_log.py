@@ -18,7 +18,7 @@ from care_sim.viewer.recording.lane import THIN, Lane, box_batch
 from care_sim.viewer.recording.measure_log import actor_state
 
 _OVERLAP = 1.3
-"""By how much longer than their share the pieces of a bending strip are: no cracks show."""
+"""Factor of the length of a bending strip's pieces, against cracks."""
 _CORNERS = (1, 2, 4, 3)
 """Places of the corners of an image box among its rays, one after the other around it."""
 _PATH_COLOUR = (46, 54, 68)
@@ -28,9 +28,9 @@ _BODY_COLOURS: dict[int | None, palette.Colour] = dict(
 """By place in `CLASSES`."""
 _NO_CLASS = (120, 124, 132)
 _GLASSY = FillMode.TransparentFillMajorWireframe
-"""Bodies are drawn so that one can look through them at what they hide."""
+"""Bodies are transparent, to show what they hide."""
 _MARGIN_M = 0.15
-"""How much larger than its body the box of the first-sighting actor is drawn."""
+"""Enlargement of the first-sighting actor's box over its body."""
 
 
 class SpaceLog:
@@ -44,7 +44,7 @@ class SpaceLog:
         self._guarded_m = guarded_m
         self._driven: list[Floats] = []
         solid, lines = FillMode.Solid, rr.LineStrips3D.from_fields
-        # What stays as it is for the whole episode; places follow with every keyframe.
+        # Log what stays for the whole episode; places follow with every keyframe.
         for entity, look in {
             "": rr.ViewCoordinates.FLU,
             "/ego": rr.Boxes3D.from_fields(colors=[palette.EGO_COLOUR], fill_mode=solid),
@@ -68,7 +68,7 @@ class SpaceLog:
             lane.fix("world/lidar/path", path)
 
     def log(self, watched: Watched) -> None:
-        """A keyframe."""
+        """Log a keyframe."""
         situation = watched.situation
         self._log_bodies(watched)
         self._log_ego(situation)
@@ -106,7 +106,7 @@ class SpaceLog:
         self._lane.log("world/lidar", rr.Transform3D(translation=sensor.origin, quaternion=turn))
 
     def _log_path(self, situation: TrueSituation) -> None:
-        """The strip on the ground that the driver guards."""
+        """Log the strip on the ground that the driver guards."""
         way = situation.way
         if not self._guarded_m:
             return

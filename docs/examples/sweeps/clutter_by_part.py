@@ -48,7 +48,11 @@ def shots(seed: int, part: str) -> Iterator[Shot]:
     level, lossless = part not in (SLOPES, ALL), part not in (RETURNS, ALL)
     with (
         patch.object(street_films, "slopes", flat if level else street_films.slopes),
-        patch.object(street_films, "as_recorded", same if lossless else street_films.as_recorded),
+        patch.object(
+            street_films,
+            "add_recorded_losses",
+            same if lossless else street_films.add_recorded_losses,
+        ),
     ):
         film = street_films.record(some_of(street), returns=FilmedReturns(clutter=True))
     yield from film.shots

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.special import logit
 
 from care_sim.core.types import CLASSES
-from care_sim.perception.pillars.decoding import one_a_place, peaks_of, points_within, score
+from care_sim.perception.pillars.decoding import drop_overlaps, peaks_of, points_within, score
 from care_sim.perception.pillars.network import CELLS, REACH_M
 from care_sim.perception.points_only import inside
 from care_sim.training.supervised.detector_data import Example, targets_of
@@ -57,7 +57,7 @@ def test_of_two_in_one_place_the_surer_stays():
     car, person = [10.0, 3, -1, 4.6, 1.9, 1.7, 0.1], [11.2, 3.3, -1, 0.6, 0.6, 1.8, 0.0]
     away = [13.2, 3.3, -1, 0.6, 0.6, 1.8, 0.0]
     for boxes in ([car, person, away], [person, car, away]):
-        assert one_a_place(np.array(boxes, float)).tolist() == [True, False, True]
+        assert drop_overlaps(np.array(boxes, float)).tolist() == [True, False, True]
 
 
 def test_what_is_less_sure_is_left_out_by_the_calibrated_score():

@@ -8,7 +8,7 @@ import pytest
 
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
-from care_sim.reports.page.episodes import Episode, episodes_to_watch, played_again
+from care_sim.reports.page.episodes import Episode, episodes_to_watch, replay_episodes
 from care_sim.reports.page.played_rows import config_of
 from care_sim.reports.page.replay import replayed
 from care_sim.reports.page.story import SECTORS, fullness, sightlines
@@ -236,14 +236,14 @@ def test_an_interrupt_does_not_wait_for_episodes_that_have_not_begun():
         return executor
 
     with pytest.raises(KeyboardInterrupt):
-        played_again(rows, 1, interrupted)
+        replay_episodes(rows, 1, interrupted)
     assert all(future.done() for future in handed)
     assert sum(future.cancelled() for future in handed) >= 15
 
 
 def test_what_cannot_be_played_says_why():
     row = CONFIG.row() | {"scenario.duration_s": 0.2}
-    good, unknown = played_again([row, row | {"policy": "forgotten"}], workers=1)
+    good, unknown = replay_episodes([row, row | {"policy": "forgotten"}], workers=1)
     assert good.replay is not None
     assert good.replay.row["keyframes"] == 2
     assert unknown.replay is None

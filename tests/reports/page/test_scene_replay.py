@@ -8,7 +8,7 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.evaluation.recall import CENSORED_AT
-from care_sim.reports.page.episodes import Episode, episodes_to_watch, played_again
+from care_sim.reports.page.episodes import Episode, episodes_to_watch, replay_episodes
 from care_sim.reports.page.listing import episode_groups, replay_data
 from care_sim.reports.page.played_rows import play_config_of
 from care_sim.reports.page.replay import replayed
@@ -49,7 +49,7 @@ def named(replay, kind):
 
 def test_rows_are_played_again_as_they_were(rows, logs):
     assert play_config_of(rows[0], logs).digest() == rows[0]["digest"]
-    again = played_again(rows, 1, lambda _workers: ThreadPoolExecutor(1), logs)
+    again = replay_episodes(rows, 1, lambda _workers: ThreadPoolExecutor(1), logs)
     assert [episode.ending for episode in again if isinstance(episode.ending, str)] == []
     assert all(episode.identical for episode in again)
     otherwise = Episode(rows[0] | {"sighted": 40.0}, again[0].ending)
@@ -82,7 +82,7 @@ def test_an_object_is_drawn_where_it_is_and_only_while_it_is_annotated(replay):
 
 
 def test_policies_of_a_scene_share_its_bodies(rows, logs):
-    again = played_again(rows, 1, lambda _workers: ThreadPoolExecutor(1), logs)
+    again = replay_episodes(rows, 1, lambda _workers: ThreadPoolExecutor(1), logs)
     data = replay_data(again)
     assert len(data["bodies"]) == 1
     assert {each["world"] for each in data["episodes"]} == {0}

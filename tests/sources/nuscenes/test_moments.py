@@ -11,7 +11,14 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.sensors.annotated import NO_OBJECT
-from tests.helpers.nuscenes_database import SENSORS, START_US, annotated, as_recorded, change, pose
+from tests.helpers.nuscenes_database import (
+    SENSORS,
+    START_US,
+    add_recorded_losses,
+    annotated,
+    change,
+    pose,
+)
 from tests.helpers.nuscenes_scene import CAR, SCENE, WORLD, database, first
 
 LEFT = "CAM_FRONT_LEFT"
@@ -41,7 +48,9 @@ def as_turned(seconds):
 def timed(folder, early_s=EARLY_S, keyframes=3, own_pose=at):
     """Keyframes of a car that drives and turns, LEFT before the sweep, other cameras with it."""
     moments = [0.5 * n for n in range(keyframes)]
-    root = database(folder, [([VAN, AHEAD], at(moment), as_recorded(WORLD)) for moment in moments])
+    root = database(
+        folder, [([VAN, AHEAD], at(moment), add_recorded_losses(WORLD)) for moment in moments]
+    )
 
     def earlier(rows):
         for row in rows:
@@ -185,7 +194,9 @@ def swept(folder, *moments, filed=1):
     """Three keyframes, 4 m apart; before the second, sweeps at the `moments` (s), filed under the
     sample of the number.
     """
-    samples = [([CAR], pose(4.0 * n), as_recorded(WORLD - [4.0 * n, 0, 0])) for n in range(3)]
+    samples = [
+        ([CAR], pose(4.0 * n), add_recorded_losses(WORLD - [4.0 * n, 0, 0])) for n in range(3)
+    ]
     root = database(folder, samples)
     for moment in moments:
         add_sweep(root, moment, filed)
@@ -203,7 +214,7 @@ def add_sweep(root, moment, filed):
     change(root, "sample_data", lambda rows: rows.append(rows[0] | data))
     change(root, "ego_pose", lambda rows: rows.append({"token": name} | pose(x)))
     (root / file).parent.mkdir(parents=True, exist_ok=True)
-    as_recorded(SEEN - [x, 0, 0]).astype("<f4").tofile(root / file)
+    add_recorded_losses(SEEN - [x, 0, 0]).astype("<f4").tofile(root / file)
 
 
 @pytest.mark.parametrize("filed", [0, 1, 2])

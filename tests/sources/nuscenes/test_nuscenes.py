@@ -20,7 +20,14 @@ from care_sim.sources.nuscenes.sweeps import owners, read_points
 from care_sim.sources.nuscenes.tables import Database
 from care_sim.sources.scenes import film_of
 from care_sim.study.scene_play import film_hash
-from tests.helpers.nuscenes_database import SENSORS, annotated, as_recorded, change, pose, write
+from tests.helpers.nuscenes_database import (
+    SENSORS,
+    add_recorded_losses,
+    annotated,
+    change,
+    pose,
+    write,
+)
 from tests.helpers.nuscenes_drive import write_drive
 from tests.helpers.nuscenes_scene import CAR, SCENE, WORLD, database, first
 
@@ -90,7 +97,9 @@ def test_recordings_between_keyframes_are_no_keyframes(tmp_path):
 
 def test_the_car_turns_and_drives_and_the_object_stays(tmp_path):
     far = annotated("vehicle.car", (20.0, 2.0, 0.85), instance="a", yaw=0.3)
-    samples = [([far], pose(4.0 * n, 0.5 * n, 0.1 * n), as_recorded(WORLD)) for n in range(4)]
+    samples = [
+        ([far], pose(4.0 * n, 0.5 * n, 0.1 * n), add_recorded_losses(WORLD)) for n in range(4)
+    ]
     shots = first(database(tmp_path, samples)).shots
     for shot in shots:
         world = shot.sensor.boxes_to_world(shot.annotations.boxes)[0]
@@ -110,7 +119,7 @@ def test_boxes_come_from_visibility_where_no_detector_was_run(tmp_path):
         )
         for name, y, level in [("a", 3.0, "4"), ("b", 1.0, "2"), ("c", -1.0, "1"), ("d", -3.0, "")]
     ]
-    (shot,) = first(database(tmp_path, [(boxes, pose(), as_recorded(WORLD))])).shots
+    (shot,) = first(database(tmp_path, [(boxes, pose(), add_recorded_losses(WORLD))])).shots
     assert shot.annotations.objects.tolist() == [0, 1, 2, 3]
     assert shot.seen.objects.tolist() == [0, 1, 3]
     surest = shot.seen.detections.confidences
@@ -148,7 +157,7 @@ def test_what_lies_outside_the_classes_or_holds_no_point_is_left_out(tmp_path):
         annotated("vehicle.trailer", (30, 0, 2)),
         annotated("vehicle.bicycle", (9, 3, 0.6), points=0),
     ]
-    (shot,) = first(database(tmp_path, [(boxes, pose(), as_recorded(WORLD))])).shots
+    (shot,) = first(database(tmp_path, [(boxes, pose(), add_recorded_losses(WORLD))])).shots
     assert len(shot.annotations) == 1
 
 
@@ -161,8 +170,8 @@ def test_boxes_without_a_point_were_present_at_the_first_keyframe(tmp_path):
     )
     trailer = annotated("vehicle.trailer", (30, 0, 2), points=0)
     samples = [
-        ([CAR, waiting, trailer], pose(), as_recorded(WORLD)),
-        ([CAR, seen], pose(4.0), as_recorded(WORLD)),
+        ([CAR, waiting, trailer], pose(), add_recorded_losses(WORLD)),
+        ([CAR, seen], pose(4.0), add_recorded_losses(WORLD)),
     ]
     movie = first(database(tmp_path, samples))
     assert [len(shot.annotations) for shot in movie.shots] == [1, 2]
@@ -181,7 +190,7 @@ def test_the_validation_split_holds_the_150_scenes_of_the_devkit():
 
 
 def test_splits_choose_scenes(tmp_path):
-    sample = [([CAR], pose(), as_recorded(WORLD))]
+    sample = [([CAR], pose(), add_recorded_losses(WORLD))]
     root = write(tmp_path, {"scene-0061": sample, "scene-0103": sample, "scene-0916": sample})
     tables = Database(root)
     assert [row["name"] for row in split_scenes(tables)] == ["scene-0103", "scene-0916"]
@@ -234,7 +243,7 @@ def said_anew():
 
 def alone(folder, *boxes, keyframes=1):
     """The tables of a standing car, without sweeps."""
-    root = database(folder, [([*boxes], pose(), as_recorded(WORLD))] * keyframes)
+    root = database(folder, [([*boxes], pose(), add_recorded_losses(WORLD))] * keyframes)
     shutil.rmtree(root / "samples")
     return root
 
@@ -275,7 +284,7 @@ def test_recorded_cameras_show_what_projection_shows(tmp_path):
     root = alone(tmp_path, CAR)
     rendered = first(root)
     shutil.copytree(
-        database(tmp_path / "swept", [([CAR], pose(), as_recorded(WORLD))]) / "samples",
+        database(tmp_path / "swept", [([CAR], pose(), add_recorded_losses(WORLD))]) / "samples",
         root / "samples",
     )
     projected = first(root)

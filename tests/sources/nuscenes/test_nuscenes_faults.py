@@ -9,7 +9,7 @@ import pytest
 from care_sim.base.errors import InvalidInput
 from care_sim.sources.nuscenes.recordings import split_scenes
 from care_sim.sources.nuscenes.tables import Database
-from tests.helpers.nuscenes_database import as_recorded, change, pose
+from tests.helpers.nuscenes_database import add_recorded_losses, change, pose
 from tests.helpers.nuscenes_scene import CAR, SCENE, WORLD, database, first
 
 NOWHERE = "no row with the token 'nowhere'"
@@ -149,7 +149,7 @@ def test_a_camera_may_look_straight_down(tmp_path):
     ],
 )
 def test_times_are_those_of_a_drive(tmp_path, stamp, reason):
-    root = database(tmp_path, [([CAR], pose(), as_recorded(WORLD))] * 2)
+    root = database(tmp_path, [([CAR], pose(), add_recorded_losses(WORLD))] * 2)
     change(root, "sample", lambda rows: rows[0].update(timestamp=0))
     change(root, "sample", lambda rows: rows[1].update(timestamp=stamp))
     assert_named(root, f"sample.json: {reason}")

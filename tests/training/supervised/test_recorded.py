@@ -207,7 +207,7 @@ def test_who_got_no_ray_is_no_object_of_the_scan(source):
         action = np.zeros(env.rig.grid.size, np.float32)
         action[returns_of(AHEAD, 0)[:1]] = 1
         env.step(action.reshape(env.rig.grid.shape))
-        one = detector_data._handed(env, None, present, False)
+        one = detector_data._detector_input(env, None, present, False)
     assert present.objects.tolist() == [AHEAD, BUS]
     assert len(one.points) == 1
     assert one.classes.tolist() == [CLASSES.index("car")]

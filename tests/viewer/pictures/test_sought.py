@@ -15,7 +15,7 @@ from care_sim.viewer.pictures.episode_view import (
     CHASE_CAMERA,
     contact_text,
     episode_view,
-    mark_sought,
+    mark_actors,
 )
 from care_sim.viewer.pictures.keyframe import draw_keyframe
 from care_sim.viewer.pictures.labels import Labels
@@ -38,7 +38,7 @@ def drive():
 def arrows(loop, frame):
     """The colours of states that the arrows have."""
     canvas = Image.new("RGB", (CHASE_CAMERA.width, CHASE_CAMERA.height))
-    mark_sought(Labels(ImageDraw.Draw(canvas)), CHASE_CAMERA, loop, frame)
+    mark_actors(Labels(ImageDraw.Draw(canvas)), CHASE_CAMERA, loop, frame)
     drawn = {colour for _, colour in canvas.getcolors(2**20)}
     return {state for state in (DETECTED, HIT, IN_VIEW, OUT_OF_VIEW) if state.colour in drawn}
 
