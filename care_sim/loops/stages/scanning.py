@@ -170,11 +170,9 @@ def _scan(
         if live[w]:
             rays = fired.counts[w]
             count = solids.counts[w]
+            shapes, halves, offsets, owners = solids.parts
             parts = Parts(
-                solids.shapes[w, :count],
-                solids.halves[w, :count],
-                solids.offsets[w, :count],
-                solids.owners[w, :count],
+                shapes[w, :count], halves[w, :count], offsets[w, :count], owners[w, :count]
             )
             cast_into(
                 (ranges[w, :rays], ids[w, :rays]),
