@@ -19,17 +19,19 @@ from care_sim.core.arrays import Floats
 from care_sim.core.belief import MAX_DETECTIONS, MAX_TRACKS, OBSERVED
 from care_sim.core.cells.stack import Grid
 from care_sim.core.conditions import MIN_RETURNS, Conditions
-from care_sim.core.firing.floor import Floor, floor_key
 from care_sim.core.firing.listing import hardware_of
 from care_sim.core.grid import Cells, Place
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action
 from care_sim.loops.observation_limits import Limits
+from care_sim.loops.stages.choice import Choice
 from care_sim.loops.truth import Truth, Watchable
 from care_sim.perception.detectors import CLUSTER, PROXY, check_detector, make_detector
 from care_sim.perception.points_only import Detector
 from care_sim.sensors.lidar import check_dead_rows
+
+_HERE = np.ones(1, np.bool_)
 
 
 def observation_space(rig: Rig) -> spaces.Space[Any]:
@@ -167,6 +169,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         )
         self.action_space = spaces.Box(0.0, 1.0, grid.shape, np.float32)
         self.observation_space = observation_space(self.rig)
+        self._choice = Choice(self._rig, conditions, np.array([self._rig.budget]))
         self._running: AnyLoop | None = None
         self._keyframe = 0
         self._over = False
@@ -222,9 +225,8 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         """Start an episode over a loop and a floor."""
         self._running = loop
         self._over = False
-        self._floor_key = floor_key(floor, self.conditions.floor_seed)
+        self._choice.begin(0, floor)
         self._keyframe = 0
-        self._last_fired = np.empty(0, np.int64)
 
     def _choose_cells(self, action: Action) -> Cells:
         """Take an action: the cells that it fires at the coming keyframe.
@@ -236,9 +238,9 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
             raise gymnasium.error.ResetNeeded("the episode is over: call reset()")
         # A copy, since the caller may write into an action once it is taken.
         self.acted = scores = checked_scores(action, self.rig.grid.shape).copy()
-        self._last_fired = fired = self._fired(scores)
+        fired = self._choice.fired(scores[None], _HERE, np.array([self._keyframe]))
         self._keyframe += 1
-        return fired
+        return fired.cells[0, : fired.counts[0]].copy()
 
     def would_fire(self, action: Action) -> Cells:
         """The cells, ascending, that an action would fire at the coming keyframe, which it leaves
@@ -246,11 +248,8 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
 
         Raises InvalidInput for an action of the wrong shape or with values that are not finite.
         """
-        return self._fired(checked_scores(action, self.rig.grid.shape))
-
-    def _fired(self, scores: Action) -> Cells:
-        floor = Floor(*self._floor_key, self._keyframe) if self.conditions.floor else None
-        return self.rig.hardware.fire(scores, self.rig.budget, floor, self._last_fired)
+        scores = checked_scores(action, self.rig.grid.shape)
+        return self._choice.would_fire(0, scores, self._keyframe)
 
     def _scan_info(self, fired: Cells) -> dict[str, Any]:
         """The fired cells and what their returns told, as `info` holds them, in copies.

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from care_sim.base.checks import check_number
 from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.cells.stack import Grid
-from care_sim.core.firing.base import Hardware, demanded, ranked
-from care_sim.core.firing.floor import Floor, draw_cells
+from care_sim.core.firing.base import Hardware, demanded, ranked, take_units, top_up
+from care_sim.core.firing.floor import Floor
 from care_sim.core.grid import Cells
 
 
@@ -57,9 +57,9 @@ class Blocks(Hardware):
         """The blocks of the demanded cells in their order, then those of the floor."""
         taken = np.zeros(self.units, np.bool_)
         most = min(budget // self.unit_cells, self.units)
-        count = _take(demanded(scores), self.unit_of, taken, 0, most)
+        count = take_units(demanded(scores), self.unit_of, taken, 0, most)
         if floor is not None:
-            _take_floor(floor, self.unit_of, taken, count, most)
+            top_up(floor, self.unit_of, taken, count, most)
         return np.flatnonzero(taken[self.unit_of])
 
     def best(self, worth: Floats, budget: int, last: Cells) -> Integers:
@@ -71,29 +71,6 @@ def _nearest_divisor(size: int, whole: int) -> int:
     """The divisor of `whole` that is nearest to `size`, of two the smaller."""
     divisors = [n for n in range(1, whole + 1) if whole % n == 0]
     return min(divisors, key=lambda n: abs(n - size))
-
-
-@compiled()
-def _take(order: Cells, unit_of: Integers, taken: Mask, count: int, most: int) -> int:
-    """Mark the units of the cells `order` as taken, in its order, until `most` of them are;
-    `count` are before. Returns how many are afterwards.
-    """
-    for cell in order:
-        if count == most:
-            break
-        unit = unit_of[cell]
-        count += not taken[unit]
-        taken[unit] = True
-    return count
-
-
-@compiled()
-def _take_floor(floor: Floor, unit_of: Integers, taken: Mask, count: int, most: int) -> None:
-    """As `_take`, of the cells of a floor."""
-    batch = 0
-    while count < most:
-        count = _take(draw_cells(floor, batch, len(unit_of)), unit_of, taken, count, most)
-        batch += 1
 
 
 class Tiles(Blocks):
