@@ -31,8 +31,6 @@ from care_sim.perception.detectors import CLUSTER, PROXY, check_detector, make_d
 from care_sim.perception.points_only import Detector
 from care_sim.sensors.lidar import check_dead_rows
 
-_HERE = np.ones(1, np.bool_)
-
 
 def observation_space(rig: Rig) -> spaces.Space[Any]:
     """The bounded observation space of a rig.
@@ -171,7 +169,6 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         self.observation_space = observation_space(self.rig)
         self._choice = Choice(self._rig, conditions, np.array([self._rig.budget]))
         self._running: AnyLoop | None = None
-        self._keyframe = 0
         self._over = False
 
     @property
@@ -215,21 +212,17 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
                 f"reset takes no options, got {shown(options)}; what an episode is made of are "
                 "arguments of the environment"
             )
-        if seed is None:
-            return int(self.np_random.integers(2**32))
-        check_seed(seed)
-        super().reset(seed=int(seed))
-        return int(seed)
+        if seed is not None:
+            check_seed(seed)
+        return entropy_of(self, seed)
 
-    def _begin(self, loop: AnyLoop, floor: np.random.SeedSequence) -> None:
-        """Start an episode over a loop and a floor."""
+    def _begin(self, loop: AnyLoop) -> None:
+        """Start an episode over a loop."""
         self._running = loop
         self._over = False
-        self._choice.begin(0, floor)
-        self._keyframe = 0
 
-    def _choose_cells(self, action: Action) -> Cells:
-        """Take an action: the cells that it fires at the coming keyframe.
+    def _taken(self, action: Action) -> NDArray[np.float32]:
+        """Take an action: its scores (1, E, A), as of one world of many.
 
         Raises InvalidInput for an action of the wrong shape or with values that are not finite, and
         gymnasium.error.ResetNeeded before `reset` and after the end.
@@ -237,10 +230,8 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         if self._over:
             raise gymnasium.error.ResetNeeded("the episode is over: call reset()")
         # A copy, since the caller may write into an action once it is taken.
-        self.acted = scores = checked_scores(action, self.rig.grid.shape).copy()
-        fired = self._choice.fired(scores[None], _HERE, np.array([self._keyframe]))
-        self._keyframe += 1
-        return fired.cells[0, : fired.counts[0]].copy()
+        self.acted = checked_scores(action, self.rig.grid.shape).copy()
+        return self.acted[None]
 
     def would_fire(self, action: Action) -> Cells:
         """The cells, ascending, that an action would fire at the coming keyframe, which it leaves
@@ -249,17 +240,17 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         Raises InvalidInput for an action of the wrong shape or with values that are not finite.
         """
         scores = checked_scores(action, self.rig.grid.shape)
-        return self._choice.would_fire(0, scores, self._keyframe)
+        return self._choice.would_fire(0, scores, self.loop.index)
 
-    def _scan_info(self, fired: Cells) -> dict[str, Any]:
-        """The fired cells and what their returns told, as `info` holds them, in copies.
 
-        Without the floor they are lists, since Gymnasium's vector environments stack arrays of one
-        length.
-        """
-        scan = {"fired": fired, **self.loop.told}
-        floor = self.conditions.floor
-        return {name: values.copy() if floor else values.tolist() for name, values in scan.items()}
+def entropy_of(env: gymnasium.Env[Any, Any], seed: int | None) -> int:
+    """The seed of an episode: the given one, with which the generator of `env` begins anew, or else
+    a draw of that generator.
+    """
+    if seed is None:
+        return int(env.np_random.integers(2**32))
+    gymnasium.Env.reset(env, seed=int(seed))
+    return int(seed)
 
 
 def split_conditions(

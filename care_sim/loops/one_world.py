@@ -19,7 +19,7 @@ from care_sim.loops.records import Keyframe, Records
 from care_sim.loops.stages.scanning import lidar_of
 from care_sim.loops.stages.sight import photographed
 from care_sim.loops.stages.state import Fired
-from care_sim.loops.truth import Told, TrackObjects
+from care_sim.loops.truth import TrackObjects
 from care_sim.perception.points_only import Detector
 from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.engines import make_engine
@@ -68,11 +68,12 @@ class OneWorld:
 
     def keyframe(self, fired: Cells) -> Keyframe:
         """Fire `fired`, act on what came back, and move on to the next keyframe."""
-        return self.record(fired, self._loop.keyframe(Fired.of([fired]), _HERE))
+        return self.record(self._loop.keyframe(Fired.of([fired]), _HERE))
 
-    def record(self, fired: Cells, records: Records) -> Keyframe:
+    def record(self, records: Records) -> Keyframe:
         """The record of the keyframe that the loop has played since."""
         loop, found, impact = self._loop, self._loop.found, self._loop.impacts.get(0)
+        counts, cells = loop.fired
         self._objects.note(found.tracks[0, : found.counts[0]], found.behind(0))
         columns: Iterable[np.ndarray] = records
         told: dict[str, Any] = {
@@ -80,7 +81,7 @@ class OneWorld:
         }
         told |= {
             "index": self.index,
-            "fired": fired,
+            "fired": cells[0, : counts[0]].copy(),
             "impact_speed_mps": impact.speed_mps if impact else None,
             "impact": impact,
             "sights": loop.sights.get(0, ()),
@@ -102,11 +103,6 @@ class OneWorld:
     def guarded_m(self) -> float:
         """Width of the strip ahead that the driver guards, metres."""
         return self._loop.driving.guarded_m
-
-    @property
-    def told(self) -> Told:
-        """What the returns of the last keyframe told besides their ranges."""
-        return self._loop.told(0)
 
     @property
     def belief(self) -> Belief:

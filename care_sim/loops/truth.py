@@ -42,14 +42,12 @@ def told_by(
 class Watchable(Protocol):
     """What environments and privileged policies ask of a loop, besides its keyframes."""
 
+    index: int
+    """The number of the coming keyframe, from 0."""
+
     @property
     def belief(self) -> Belief:
         """All that a policy may know when it chooses the cells."""
-        ...
-
-    @property
-    def told(self) -> Told:
-        """What the returns of the last keyframe told besides their ranges."""
         ...
 
     def true_boxes(self, tracks: Tracks) -> Floats:

@@ -23,7 +23,7 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import Action
 from care_sim.envs import scenarios
 from care_sim.envs.closed_loop import ClosedLoopEnv
-from care_sim.envs.sensing import Observed, checked_scores
+from care_sim.envs.sensing import Observed, checked_scores, entropy_of
 from care_sim.envs.vector.arguments import (
     autoreset_of,
     joined,
@@ -35,6 +35,7 @@ from care_sim.envs.vector.arguments import (
     worlds_to_reset,
 )
 from care_sim.envs.worlds import Stepped, Worlds
+from care_sim.loops.stages.choice import Choice
 from care_sim.scenarios.base import Scenario
 
 _T = TypeVar("_T")
@@ -148,6 +149,8 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         ends = [num_envs * k // count for k in range(count + 1)]
         self._shares = [slice(*ends[k : k + 2]) for k in range(count)]
         self._worlds = [self._made(share) for share in self._shares]
+        # Each draws the seeds of its later episodes as the single environment does.
+        self._seeded = [gymnasium.Env[Any, Any]() for _ in range(num_envs)]
         self._threads = Threads(count)
         self._steps = np.zeros(num_envs, np.int64)
         self._over = np.zeros(num_envs, np.bool_)
@@ -278,8 +281,10 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
     def _made(self, share: slice) -> Worlds:
         rows = _rows(self._observed, share)
         settings = [model.setting for model in self._models[share]]
+        budgets = np.array([one.rig.budget for one in settings])
+        choice = Choice(self._model.rig, self._model.conditions, budgets)
         # Where no info tells of clearances, few of them are needed.
-        return Worlds(settings, rows, self._model.scoring_info, self._one_budget)
+        return Worlds(settings, choice, rows, self._model.scoring_info, self._one_budget)
 
     def _played(self, scores: NDArray[np.float32], who: Mask) -> Stepped:
         # An error leaves worlds at different keyframes: then all have to begin anew.
@@ -313,7 +318,8 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         self._begun[who] = False
         # One share after the other: this is Python nearly alone, and threads would take turns.
         for worlds, share in zip(self._worlds, self._shares, strict=True):
-            own = {world: seeds[share.start + world] for world in _places(who[share])}
+            numbers = {world: share.start + world for world in _places(who[share])}
+            own = {world: entropy_of(self._seeded[n], seeds[n]) for world, n in numbers.items()}
             for world, info in (worlds.begin(own) if own else {}).items():
                 infos = self._add_info(infos, info, share.start + world)
         self._over[who] = False
