@@ -222,7 +222,7 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
         return self._observed(self._worlds), info
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
-        """Fire the cells that `action` scores highest and go on to the next keyframe.
+        """Fire the cells that `action` scores highest and advance to the next keyframe.
 
         Raises InvalidInput for an action of the wrong shape or with values that are not finite, and
         gymnasium.error.ResetNeeded before `reset`, after the end, and after an error or interrupt

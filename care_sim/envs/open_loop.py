@@ -119,7 +119,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
 
     @property
     def score(self) -> SceneScore:
-        """What was found of the scene; complete once the episode is over."""
+        """The detected objects of the scene; complete once the episode is over."""
         return SceneScore.of(self._sightings, self._masks)
 
     @property
@@ -155,7 +155,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         return loop.belief.to_observation(), info
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
-        """Fire the cells that `action` scores highest and go on to the next keyframe.
+        """Fire the cells that `action` scores highest and advance to the next keyframe.
 
         Raises InvalidInput for an action of the wrong shape or with values that are not finite, and
         gymnasium.error.ResetNeeded before `reset` and after the end.

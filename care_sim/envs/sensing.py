@@ -1,4 +1,4 @@
-"""What the environments of both loops share: a rig, its spaces, and its budget.
+"""The base of both loops' environments: a rig, its spaces and its budget.
 
 No action can overspend that budget.
 """
@@ -59,7 +59,7 @@ def checked_scores(action: NDArray[np.floating], shape: tuple[int, ...]) -> NDAr
     if scores.dtype.kind not in "biuf":
         raise InvalidInput(f"action must hold numbers, got {scores.dtype}")
     if scores.dtype != np.float32:
-        # What overflows float32 becomes infinite, and is refused below.
+        # Overflow of float32 becomes infinite, which the check below refuses.
         with np.errstate(over="ignore"):
             scores = scores.astype(np.float32)
     if not np.isfinite(scores).all():
@@ -119,7 +119,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
 
     acted: NDArray[np.float32]
     conditions_kind: ClassVar[type[Conditions]] = Conditions
-    """What its conditions are made as."""
+    """The class of its conditions."""
 
     def __init__(
         self,
@@ -197,7 +197,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
 
     @property
     def truth(self) -> Truth:
-        """What privileged policies may ask for; `make_policy` hands it to them alone."""
+        """The truth that privileged policies may read; `make_policy` gives it to them alone."""
         return Truth(self)
 
     def _entropy(self, seed: int | None, options: dict[str, Any] | None) -> int:
@@ -267,7 +267,7 @@ def split_conditions(
 
 
 def arguments_of(kind: type[SensingEnv[Any]]) -> list[str]:
-    """What an environment's class takes by name: its own arguments and the conditions."""
+    """Return the keyword arguments of an environment's class: its own and the conditions."""
     # Each class of the family names some arguments and hands the rest on.
     made = [
         vars(one)["__init__"]

@@ -70,8 +70,8 @@ class History:
         self._all = np.arange(worlds)
 
     def note(self, keyframes: Integers, records: Records) -> None:
-        """Keep the records of the `keyframes` (W,); a world that rests keeps them until it goes
-        on.
+        """Keep the records of the `keyframes` (W,); a resting world keeps them until it plays
+        again.
         """
         self._table[keyframes, self._all] = np.array(records, float).T
 
@@ -174,8 +174,8 @@ class Worlds:
         return stepped
 
     def _columns(self, told: Mapping[int, Mapping[str, np.ndarray]]) -> dict[str, NDArray[Any]]:
-        """Return the columns of what was `told` of the cells: (W, B), or (W,) arrays of each
-        world's own where budgets differ.
+        """Return the scan data `told` as columns: (W, B), or (W,) arrays of each world's own where
+        budgets differ.
         """
         conditions, worlds = self._first.conditions, len(self._settings)
         # There are columns even where nobody plays, to be joined with those of other threads.
@@ -193,9 +193,7 @@ class Worlds:
         return columns
 
     def _played(self, fired: Fired, who: Mask) -> Stepped:
-        """Let those play that are True in `who` (n,), and fire these cells; without what infos tell
-        of them.
-        """
+        """Play the worlds `who` (n,) with these cells fired; the columns lack scan data."""
         # Asked before the keyframe, which moves the worlds on, and only while it is needed: it
         # costs rays.
         loop, first = self.loop, self._first

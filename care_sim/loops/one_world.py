@@ -62,7 +62,7 @@ class OneWorld:
         paper's proxy detects what enough fired rays hit.
         """
         loop = Loop([rig], [conditions], duration_s, [detector])
-        # Whoever chooses the cells needs no floor.
+        # The caller chooses the cells, so no floor is needed.
         loop.begin({0: Episode(world, seeds, _NO_FAULT, pool)})
         return cls(loop)
 
@@ -91,7 +91,7 @@ class OneWorld:
 
     @property
     def world(self) -> World:
-        """The world at the coming keyframe. Its bodies are moved there when it is asked for."""
+        """The world at the coming keyframe. Reading it moves its bodies there."""
         return self._loop.world(0)
 
     @property
@@ -152,7 +152,7 @@ class OneWorld:
         return self._lidar.bodies(self.sensor)
 
     def full_scan(self) -> Scan:
-        """What every cell would return now, before noise and dropout. Truth: for the privileged
+        """Return the scan of all cells now, before noise and dropout. Truth: for the privileged
         alone.
         """
         return self._lidar.peek(self.sensor)
@@ -174,8 +174,8 @@ class OneWorld:
         return self._loop.shows(0, body)
 
     def faultless(self, cameras: tuple[PinholeCamera, ...] | None = None) -> IdentifiedDetections:
-        """What a detector without faults would report of `cameras`, those of the rig unless given.
-        Truth: for scoring and people.
+        """Return the faultless detections of `cameras`, by default those of the rig. Truth: for
+        scoring and people.
         """
         world, taken = self.world, cameras or self.rig.cameras
         labels, engine = world.labels(), self._loop.conditions.engine
@@ -185,7 +185,7 @@ class OneWorld:
 
     @property
     def mounted(self) -> tuple[PinholeCamera, ...]:
-        """The cameras as they really stand."""
+        """The cameras at their true mounts."""
         own = self._loop.sight.own_cameras.get(0)
         return self.rig.cameras if own is None else own.detector.mounted
 

@@ -293,8 +293,8 @@ class Energy(FreeCells):
     The scores say how the energy is to be shared. Shots are dealt one by one, each to the cell
     whose score is the highest per shot that it would then have (as seats are dealt to parties by
     D'Hondt). So equal scores have equally many shots, all cells their first one before any its
-    second, and scores of 3 to 1 ask for three shots to one. The floor spends what is left once
-    every demanded cell has `shots`. With one shot that is free cells.
+    second, and scores of 3 to 1 get three shots to one. The floor spends what is left once every
+    demanded cell has `shots`. With one shot that is free cells.
 
     No product is known that aims every shot and counts photons over several.
     """

@@ -23,8 +23,8 @@ _NOTHING = np.empty(0, np.int64)
 
 
 class Choice:
-    """What the LiDARs of W worlds fire, each with its own of the `budgets` (W,), with the hardware
-    of a `rig` and the `conditions` of the floor.
+    """Chooses the cells that the LiDARs of W worlds fire, each within its own of the `budgets`
+    (W,). The hardware is that of the `rig`, the floor that of the `conditions`.
     """
 
     def __init__(self, rig: Rig, conditions: Conditions, budgets: Integers):
@@ -47,8 +47,8 @@ class Choice:
         self._last[world] = _NOTHING
 
     def fired(self, scores: NDArray[np.float32], live: Mask, keyframes: Integers) -> Fired:
-        """The cells that fire by `scores` (W, E, A), finite numbers, in the worlds that are `live`
-        (W,), at their `keyframes` (W,); none in the others.
+        """Return the cells that fire by `scores` (W, E, A), finite numbers, in the worlds that are
+        `live` (W,), at their `keyframes` (W,); none in the others.
 
         The tables of free cells are the same at every call, and hold its cells till the next.
         """
@@ -60,8 +60,8 @@ class Choice:
         return self._fired
 
     def would_fire(self, world: int, scores: NDArray[np.float32], keyframe: int) -> Cells:
-        """The cells that would fire in a world by `scores` (E, A) at a keyframe. Nothing changes by
-        the question.
+        """Return the cells that would fire in a world by `scores` (E, A) at a keyframe. Changes
+        nothing.
         """
         first, second = self._keys[world].tolist()
         floor = Floor(first, second, keyframe) if self._conditions.floor else None

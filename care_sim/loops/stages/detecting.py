@@ -1,4 +1,4 @@
-"""What the detectors of all worlds make of the returns.
+"""The detectors of all worlds.
 
 The paper's proxy (`care_sim.perception.proxy`) detects in compiled code, any other detector world
 by world.
@@ -135,8 +135,9 @@ class _OneDetector:
         """Classes (n,), sensor-frame boxes (n, 7) and the body (n,) behind each detection or
         NO_OBJECT, of the returns of `bodies`; and (k,) all bodies that were found.
 
-        What is found is scored by the class-consistent 2 m match (paper, Remark 1), and only what a
-        box has returns of: else a box on the end of a lorry would find who is hidden behind it.
+        Found bodies are scored by the class-consistent 2 m match (paper, Remark 1), and only bodies
+        with returns in a box count: else a box on the end of a lorry would find a person hidden
+        behind it.
         """
         detector, sensor = self._detector, state.sensors.frame(world)
         objects = self._named[np.minimum(bodies, len(self._named) - 2)]

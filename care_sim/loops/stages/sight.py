@@ -1,4 +1,4 @@
-"""What the cameras of all worlds show, and the detections that arrive.
+"""The cameras of all worlds, and the detections that arrive.
 
 The pictures are those of the engine `fast` (`care_sim.sensors.engines.picture_kernels`), the
 detections those of an ideal camera (`care_sim.sensors.camera`): it may miss bodies, be late and
@@ -364,8 +364,8 @@ def _photograph(
     poses: Floats,
     room: _Room,
 ) -> Integers:
-    """The table of what a camera shows around boxes (n, 7) in the frame of the sensor, whose place
-    and turn are told.
+    """Return the table of the bodies that a camera shows around boxes (n, 7), in the frame of the
+    sensor, which is given by place and turn.
     """
     model = model_of(cameras.models, number)
     width, height = cameras.sizes[number]

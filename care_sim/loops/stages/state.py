@@ -1,8 +1,8 @@
 """The state of W worlds, as arrays with a row per world that compiled code takes whole.
 
 W worlds, each with its own numbers of bodies, parts, tracks: tables are as long as the longest
-needs, and `counts` (W,) says how many rows of a world's table are in use. What lies beyond them
-means nothing. World frame, metres and radians, unless it says otherwise.
+needs, and `counts` (W,) says how many rows of a world's table are in use. Rows beyond mean nothing.
+World frame, metres and radians, unless it says otherwise.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -88,12 +88,12 @@ class Sensors(NamedTuple):
         return cls(np.zeros((worlds, 6)), np.zeros((worlds, 2)), np.zeros((worlds, 2)))
 
     def frame(self, world: int) -> Frame:
-        """That of a world."""
+        """Return the frame of a world."""
         x, y, z, yaw, _, _ = self.poses[world].tolist()
         return Frame(x, y, z, yaw)
 
     def put(self, world: int, frame: Frame) -> None:
-        """Write that of a world."""
+        """Write the frame of a world."""
         self.poses[world, :4] = frame.x, frame.y, frame.z, frame.yaw
         self.turns[world] = np.cos(frame.yaw), np.sin(frame.yaw)
         self.turns_back[world] = frame.turn_back
@@ -133,7 +133,7 @@ class Fired(NamedTuple):
 
 
 class Passages(NamedTuple):
-    """What happened while the worlds moved on to the next keyframe; (W,) each, columns as in
+    """Events while the worlds moved to the next keyframe; (W,) each, columns as in
     `care_sim.world.approach.ClosestApproach`: `nearest_m`, `clearance_m`; whether there was an
     impact, `hit`, and the ego's speed `impact_speed_mps` at the first one. `impacts` holds these
     first impacts by world.
