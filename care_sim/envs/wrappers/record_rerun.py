@@ -156,10 +156,11 @@ class RecordRerun(Watching):
     once its episode is over or the environment is closed. Action, observation, reward and episode
     stay as they are.
 
-    ### Arguments `path` of the file; `policy`, the `care_sim.Policy` that acts, if one does. Its
-    demands show which cells were exploitation and which reserve; without it only "chosen" and
-    "floor" are known. `name` of the episode in the recording, the policy's by default. Environments
-    of a vector need one file each, such as `f"out-{number}.rrd"`.
+    ### Arguments
+    `path` of the file; `policy`, the `care_sim.Policy` that acts, if one does. Its demands show
+    which cells were exploitation and which reserve; without it only "chosen" and "floor" are known.
+    `name` of the episode in the recording, the policy's by default. Environments of a vector need
+    one file each, such as `f"out-{number}.rrd"`.
 
     ### What is recorded
     At every keyframe: the street, the returns, the camera's picture and detections, the cells, the
