@@ -114,7 +114,7 @@ def _fill(
     """Let stages take cells into an empty selection, and return how many. Stage k is the
     `counts[k]` sets from `firsts[k]` on, and fills up to `limits[k]` cells in all.
     """
-    # A stage goes on where the one before it stopped, with the same cells taken.
+    # A stage continues from the cells that the stage before it took.
     count = 0
     for stage in range(len(counts)):
         open_sets = np.arange(firsts[stage], firsts[stage] + counts[stage])

@@ -1,4 +1,4 @@
-"""What a policy may know at a keyframe, and how an observation of Gymnasium holds it."""
+"""The knowledge of a policy at a keyframe, and its form as an observation of Gymnasium."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,8 +15,8 @@ from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
 
 SOUND, BEYOND, NO_ROW = range(3)
-"""What the rows of a table can be: in order; with a number beyond the bound, or NaN; neither
-padding nor of a known class."""
+"""Verdicts on the rows of a table: in order; a number beyond the bound, or NaN; neither padding nor
+of a known class."""
 
 
 @compiled()
@@ -88,7 +88,7 @@ def rows_within(rows: Floats, least: Floats, most: Floats) -> bool:
 @compiled()
 def range_image(size: int, cells: Integers, ranges: Floats, reach: float) -> NDArray[np.float32]:
     """(N,) metres of the fired `cells` (n,), `reach` where nothing returned, 0 of cells that were
-    not fired. Of a cell with several returns the first counts.
+    not fired. The first of several returns of a cell counts.
     """
     image = np.empty(size, np.float32)
     lay_ranges(image, cells, ranges, reach)
@@ -108,7 +108,7 @@ MAX_DETECTIONS = 128
 MAX_TRACKS = 256
 """Rows of the observation: one that explains every detection, and as many again."""
 OBSERVED = ("ego", "budget", "detections", "tracks", "ranges")
-"""What an observation consists of."""
+"""The parts of an observation."""
 HIGHEST = 2.0**24
 """No number of an observation is larger: the largest whole number that float32 holds beside all
 smaller ones."""
@@ -218,7 +218,7 @@ def rows_of(
     and how many there are of each (W,). Raises InvalidInput for rows that are neither padding nor
     of a known class, and for what no sensor says.
     """
-    # What an environment shows is compiled for; anything else is made the same first.
+    # Observations of environments are compiled for; other numbers are converted first.
     if tables.dtype != np.float32:
         tables = tables.astype(np.float64)
     rows, counts, verdict = read_rows(

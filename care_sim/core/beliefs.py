@@ -1,5 +1,5 @@
-"""What is believed in several worlds, as the rows of all: what goes row by row is then done once
-for all of them.
+"""Beliefs of several worlds, as the rows of all: what goes row by row is then done once for all of
+them.
 """
 
 from collections.abc import Mapping
@@ -34,8 +34,8 @@ class Beliefs:
 
     `egos` (W, 3) are speed, yaw rate and acceleration, `budgets` (W,) cells, `scans` (W, E, A) the
     images of the last scans. `detections` and `tracks` are those of all worlds, those of one world
-    after those of another: so many of each are `detected` and `tracked` (W,). Of worlds that are
-    not `live` (W,) there are no rows, and numbers are 0 or mean nothing.
+    after those of another: so many of each are `detected` and `tracked` (W,). Worlds that are not
+    `live` (W,) have no rows, and their numbers are 0 or mean nothing.
     """
 
     rig: Rig
@@ -50,7 +50,7 @@ class Beliefs:
 
     @classmethod
     def of(cls, belief: Belief, rig: Rig) -> "Beliefs":
-        """That of one world."""
+        """Return the belief of one world in this form."""
         ego, detections, tracks = belief.ego, belief.detections, belief.tracks
         counts = np.array([len(detections), len(tracks), belief.budget])
         egos = np.array([[ego.speed, ego.yaw_rate, ego.acceleration]])
@@ -94,8 +94,8 @@ class Beliefs:
 
     @cached_property
     def ranges(self) -> NDArray[np.float32]:
-        """(W, N) the last scans in metres. Raises InvalidInput for what no sensor says. They are
-        looked through when somebody asks for them, which few do: it takes longer than all the rest.
+        """(W, N) the last scans in metres. Raises InvalidInput for numbers that no sensor measures.
+        Checked lazily, because the check takes longer than all the others.
         """
         ranges = np.ascontiguousarray(self.scans).reshape(len(self), -1)
         if not lie_between(ranges if self.live.all() else ranges[self.live], 0.0, HIGHEST):

@@ -35,11 +35,11 @@ class DriverSettings:
     """
 
     driver: str = one_of(FIXED, DRIVERS)
-    """Who brakes: `fixed`, the controller of `care_sim.driving.braking`, or `careful-human`, the
-    driver model of UN Regulation 157 (`care_sim.driving.drivers`).
+    """The driver that brakes: `fixed`, the controller of `care_sim.driving.braking`, or
+    `careful-human`, the driver model of UN Regulation 157 (`care_sim.driving.drivers`).
     """
     brake_mps2: float = bounded(5.0, 0.1, 20)
-    """Deceleration b, m/s^2; 5 is the least that UN Regulation 152 asks of emergency braking."""
+    """Deceleration b, m/s^2; UN Regulation 152 requires at least 5 of emergency braking."""
     brake_reaction_s: float = bounded(0.3, 0, 10)
     """From decision to full braking, seconds: build-up of brake pressure."""
     brake_standstill_m: float = bounded(2.0, 0, 50)
@@ -84,7 +84,7 @@ _LEAST_M = 0.01
 
 @dataclass(frozen=True, kw_only=True)
 class ReturnSettings:
-    """What becomes of a LiDAR's pulses on their way there and back, one switch for each effect.
+    """Effects on a LiDAR's pulses on their way there and back, one switch for each.
 
     Every switch is off by default: then each fired cell returns what its ray meets within reach.
     The formulas lie in `care_sim.sensors`, each with its source; `docs/returns.md` shows them
@@ -131,7 +131,7 @@ class ReturnSettings:
 
     @property
     def shapes_beams(self) -> bool:
-        """Whether a ray alone does not tell what a cell returns."""
+        """Whether the returns of a cell need more than one ray."""
         return bool(self.lidar_stated_range_m or self.lidar_divergence_mrad or self.lidar_sweep_s)
 
     def check_returns(self) -> None:
@@ -200,7 +200,7 @@ LONGEST_CORRELATION_S = 1e6
 
 @dataclass(frozen=True, kw_only=True)
 class CameraFaults:
-    """What the camera gets wrong."""
+    """Errors of the camera."""
 
     camera_profile: str = one_of(IDEAL_CAMERA, CAMERA_PROFILES)
     """The detector that the camera is like: `ideal`, or `yolox`
@@ -255,7 +255,7 @@ class CameraFaults:
 
 @dataclass(frozen=True, kw_only=True)
 class LidarFaults:
-    """What the LiDAR gets wrong."""
+    """Errors of the LiDAR."""
 
     lidar_range_sigma: float = bounded(0.0, 0, 50)
     """Gaussian noise on every range, metres, folded back at 0 and at the reach. Policies meet it;
@@ -297,8 +297,8 @@ class Sensing(CameraFaults, LidarFaults, ReturnSettings):
     """How long these errors last, seconds (`care_sim.driving.localisation`): 0 draws them anew at
     every keyframe, a time far beyond the episode lets them walk at random."""
     engine: str = "fast"
-    """What casts the rays and draws the pictures of the closed loop: `fast`, which is compiled, or
-    `bullet`, PyBullet's own and the reference.
+    """The engine that casts the rays and draws the pictures of the closed loop: `fast`, which is
+    compiled, or `bullet`, PyBullet's own and the reference.
     """
     min_returns: int = bounded(MIN_RETURNS, 1, LARGEST_INTEGER)
     """Fired rays that must hit an object for it to be detected."""
@@ -355,9 +355,9 @@ class Conditions(Sensing):
     `core-spread`.
     """
     firing: str = CELLS
-    """What the LiDAR can fire (`care_sim.core.firing`): `cells`, `tiles:ROWSxCOLUMNS`,
-    `segments:COLUMNS`, `rows`, `columns`, `vertical-window`, `azimuth-window:DEGREES` or
-    `energy:SHOTS`.
+    """The hardware, which limits what the LiDAR can fire (`care_sim.core.firing`): `cells`,
+    `tiles:ROWSxCOLUMNS`, `segments:COLUMNS`, `rows`, `columns`, `vertical-window`,
+    `azimuth-window:DEGREES` or `energy:SHOTS`.
     """
 
     def __post_init__(self) -> None:
@@ -383,7 +383,7 @@ class Conditions(Sensing):
 
 @dataclass(frozen=True, kw_only=True)
 class ClosedLoopConditions(DriverSettings, Conditions):
-    """All conditions: those of both loops, and the driver, whom only the closed loop has. Raises
+    """All conditions: those of both loops, and the driver, which only the closed loop has. Raises
     InvalidInput for a `sweep_mask` and for `clutter`, which films alone have.
     """
 

@@ -109,8 +109,8 @@ class Forgetting:
 
 def uncertainty_margin(position_sigma_m: float, boxes: Floats, rig: Rig) -> Floats:
     """m_unc of Eq. 4: (n,) whole columns for boxes (n, 7) whose positions are uncertain by
-    `position_sigma_m`, at most the margin of a full hull. Of several LiDARs the one that needs the
-    most decides.
+    `position_sigma_m`, at most the margin of a full hull. The LiDAR that needs the widest margin
+    decides.
     """
     needed = np.max([_columns(position_sigma_m, boxes, head) for head in rig.grid.heads], 0)
     return np.asarray(np.minimum(needed, rig.azimuth_margin))
@@ -124,8 +124,8 @@ def _columns(position_sigma_m: float, boxes: Floats, head: Head) -> Floats:
 
 
 def released_cells(hulls: Sequence[Cells], exploitation: Sequence[Cells], size: int) -> int:
-    """How many cells of the full `hulls` none of the sets of `exploitation` asks for, in a grid of
-    so many cells.
+    """Return how many cells of the full `hulls` are in no set of `exploitation`, in a grid of
+    `size` cells.
 
     A cell that another hull holds on to is not released. The paper gives such a number (Sec. 5.4)
     and does not define it.

@@ -25,7 +25,7 @@ def mounted_at(
     place: tuple[_Number, _Number], turn: tuple[_Number, _Number], at: tuple[float, float, float]
 ) -> tuple[_Number, _Number]:
     """World x and y of what is mounted `at` (x, y, z) in the frame of a body at a `place` on the
-    ground; `turn` is the cosine and the sine of its yaw. Of one body, or of many as columns.
+    ground; `turn` is the cosine and the sine of its yaw. For one body, or for many as columns.
     """
     (x, y), (cos, sin), (ahead, left, _) = place, turn, at
     return x + (cos * ahead - sin * left), y + (sin * ahead + cos * left)
@@ -61,8 +61,8 @@ def turned_alike(vectors: Floats, turn: tuple[float, float]) -> Floats:
 
 
 _LOCKED = 1 - 1e-13
-"""Sine of a pitch (89.99997 degrees) at which yaw and roll turn about one axis: all of it is told
-as yaw.
+"""Sine of a pitch (89.99997 degrees) at which yaw and roll turn about one axis: all of it counts as
+yaw.
 """
 
 
@@ -212,7 +212,7 @@ def placed_at(boxes: Floats, turn: tuple[float, float], place: _Place) -> Floats
 
 def _boxes_turned(boxes: Floats, centres: Floats, turn: Callable[[Floats], Floats]) -> Floats:
     """Boxes of the same sizes at `centres` (n, 3), their headings turned by `turn`."""
-    # A box keeps one angle. Of its heading, turned in space, that is the direction in the plane.
+    # A box keeps one angle: the direction in the plane of its heading, turned in space.
     yaw = boxes[:, 6]
     heading = turn(np.column_stack([np.cos(yaw), np.sin(yaw), np.zeros(len(yaw))]))
     return np.column_stack([centres, boxes[:, 3:6], np.arctan2(heading[:, 1], heading[:, 0])])

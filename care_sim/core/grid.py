@@ -1,10 +1,10 @@
 """The angular grid of firing cells, and the cells that boxes and ray bundles cover.
 
-Frame: sensor frame, x forward, y left, z up; metres and radians. A cell's index is
-`row * columns + column`; row 0 is the highest elevation and column c covers the azimuths
-[right + c * width, right + (c + 1) * width). All round the car, which is the default, `right` is
--pi. Azimuths and elevations are about the grid's own axes, which the sensor frame has, too, unless
-the LiDAR is tilted to the car; directions, boxes and rays are told in the sensor frame.
+Frame: sensor frame, x forward, y left, z up; metres and radians. A cell's index is `row * columns +
+column`; row 0 is the highest elevation and column c covers the azimuths [right + c * width, right +
+(c + 1) * width). All round the car, which is the default, `right` is -pi. Azimuths and elevations
+are about the grid's own axes, which the sensor frame has, too, unless the LiDAR is tilted to the
+car; directions, boxes and rays are in the sensor frame.
 """
 
 from dataclasses import fields, replace
@@ -37,10 +37,10 @@ AT_LIDAR_M = 1.5
 """A camera within this of a LiDAR is taken to stand at it, as the paper's wedges do without a word
 on it: the six of nuScenes are 0.5 to 1.0 m from LIDAR_TOP."""
 LEAST_DEPTH_M = 5.0
-"""What a camera farther from a LiDAR shows is sought from this depth on. It is along the optical
-axis of that camera, so that beside the middle of a picture it begins farther away. A car needs
-4.3 m to stop from 30 km/h at 8 m/s^2: what is first seen nearer comes too late for any LiDAR, and
-every metre less widens the wedges of all that is farther."""
+"""The wedges of a camera farther from a LiDAR begin at this depth along its optical axis, so that
+beside the middle of a picture they begin farther away. A car needs 4.3 m to stop from 30 km/h at 8
+m/s^2: an object first seen nearer is too late for any LiDAR, and every metre less widens the wedges
+of all that is farther."""
 _ORIGIN = np.zeros(3)
 _ORIGIN.flags.writeable = False
 
@@ -83,7 +83,7 @@ class Head(NamedTuple):
 
 
 class HeadCells:
-    """What whoever fires cells asks of the grid of one LiDAR or of several."""
+    """The properties that firing cells needs of the grid of one LiDAR or of several."""
 
     @cached_property
     def heads(self) -> tuple[Head, ...]:
@@ -232,9 +232,9 @@ class AngularGrid(GridRays, HeadCells):
         """The dilated angular rectangle of every bundle of rays (n, k, 3), as ascending cells.
 
         The first ray of a bundle is its middle; the others lie within half a turn of it. `starts`
-        (n, 3) is where the rays of each start, if not at the LiDAR. Those within `AT_LIDAR_M` of it
-        count as rays of its own. Of the others the four behind the middle are the corners of an
-        image box, one unit of depth long: their rectangle holds all that they enclose, seen from
+        (n, 3) is where the rays of each start, if not at the LiDAR. Starts within `AT_LIDAR_M` of
+        it count as rays of its own. Elsewhere, the four rays behind the middle are the corners of
+        an image box, one unit of depth long: their rectangle holds all that they enclose, seen from
         the LiDAR, from `LEAST_DEPTH_M` on and as far as it reaches.
         """
         bundles = np.asarray(bundles, dtype=float)

@@ -260,7 +260,7 @@ MOST_PIXELS = 2**14
 FARTHEST_M = 1000.0
 """A camera of the car lies within this of its LiDAR."""
 _MOST_RADIANS = 100 * np.pi
-"""Angles may go round, as long as a float tells them apart."""
+"""Angles may go round, as long as floats distinguish them."""
 
 
 @dataclass(frozen=True)

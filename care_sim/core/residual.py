@@ -149,8 +149,8 @@ def _first_explaining(
     """Eq. 2: (n,) the row of the first forecast of the class of each detection whose centre lies in
     its image box, -1 without one.
 
-    Of `detections` (n, 9) and forecasts, `tracks` (m, 13), world after world has so many `detected`
-    (W,) and `tracked` (W,), and is matched by itself.
+    `detections` (n, 9) and forecasts `tracks` (m, 13) are those of all worlds, `detected` (W,) and
+    `tracked` (W,) of each. Each world is matched by itself.
     """
     # Forecasts come nearest first, so the first match is the nearest one.
     found = np.full(len(detections), -1)

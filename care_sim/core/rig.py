@@ -1,4 +1,4 @@
-"""What is fixed about the sensing task: grid, cameras, budget, margins."""
+"""The fixed settings of the sensing task: grid, cameras, budget, margins."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -31,17 +31,17 @@ from care_sim.core.pinhole import CameraModels, PinholeCamera, camera_models, ch
 from care_sim.core.types import Demand, ImageDetections
 
 LIDAR_X_M = -0.445
-"""Of the LiDAR before the car's middle: LIDAR_TOP of nuScenes, 0.94 m before the rear axle of a
-Renault Zoe."""
+"""Place of the LiDAR before the car's middle: LIDAR_TOP of nuScenes, 0.94 m before the rear axle of
+a Renault Zoe."""
 LIDAR_HEIGHT_M = 1.84
-"""Of the LiDAR above the road: LIDAR_TOP of nuScenes."""
+"""Height of the LiDAR above the road: LIDAR_TOP of nuScenes."""
 MOST_SHIFT_M = 20.0
 """A LiDAR lies within this of the middle of its car."""
 
 
 @dataclass(frozen=True)
 class Rig:
-    """What is fixed about the sensing task and known to a policy in advance.
+    """The fixed settings of the sensing task, which a policy knows in advance.
 
     `budget` is B in cells and `reserve_fraction` rho of Algorithm 1; `keyframe_s` is the time
     between two decisions. Hulls and wedges are dilated by `azimuth_margin` columns and
@@ -49,7 +49,7 @@ class Rig:
     road, `sensor_x_m` before and `sensor_y_m` left of the car's middle. The sets that a policy
     demands are listed in a `cell_order` (`care_sim.core.cells.order.CELL_ORDERS`) before cells are
     chosen. `firing` names the hardware that fires them (`care_sim.core.firing`), and `returns` how
-    their pulses return, without crosstalk. `setup` tells the set-up by name and hash
+    their pulses return, without crosstalk. `setup` names the set-up and its hash
     (`care_sim.core.sensor_setup`); nothing of recordings, and of rigs that were made without one.
     Raises InvalidInput for a value out of its bounds.
     """
@@ -108,7 +108,9 @@ class Rig:
 
     @cached_property
     def hardware(self) -> Hardware:
-        """What the LiDAR can fire. Raises InvalidInput for units that do not divide the grid."""
+        """The hardware of the LiDAR, which limits its cells. Raises InvalidInput for units that do
+        not divide the grid.
+        """
         return hardware_of(self.firing, self.grid)
 
     @cached_property
@@ -118,8 +120,8 @@ class Rig:
 
     @cached_property
     def wedge_starts(self) -> Floats | None:
-        """(k, 3) where the cameras stand, as `AngularGrid.wedges` asks for it; None where all count
-        as standing at the one LiDAR.
+        """(k, 3) the places of the cameras, as `AngularGrid.wedges` takes them; None where all
+        count as standing at the one LiDAR.
         """
         places = self.camera_models.positions
         apart = np.linalg.norm(places, axis=1) > AT_LIDAR_M

@@ -1,4 +1,4 @@
-"""What is mounted on the car: the grids of its LiDARs, where these stand, and the cameras."""
+"""The sensors mounted on the car: the grids of its LiDARs, where these stand, and the cameras."""
 
 import json
 from collections.abc import Sequence
@@ -29,8 +29,8 @@ class SensorSetup:
     """A LiDAR and its cameras, by name; several LiDARs are made one by `of_lidars`.
 
     `position` is the LiDAR's x, y and z in the frame of the car: metres before, left of and above
-    the point on the road below the car's middle. Of several it is that of the first, in whose frame
-    the `grid` tells the places of the others. The axes of the sensor frame are those of the car:
+    the point on the road below the car's middle. With several LiDARs it is the place of the first,
+    in whose frame the `grid` holds the others. The axes of the sensor frame are those of the car:
     the grid's `heading`, `pitch` and `roll` turn the rays in it. So boxes and cameras stay upright,
     however the LiDAR is mounted. `cameras` are placed in the sensor frame; without any, those of
     the scenario stay where they are on the car. Raises InvalidInput for a value out of its bounds,
@@ -147,7 +147,7 @@ class SensorSetup:
 
 
 def grid_of(plain: dict[str, Any]) -> Grid:
-    """The grid of one or several LiDARs from plain data, as `dataclasses.asdict` tells it."""
+    """The grid of one or several LiDARs from plain data, as `dataclasses.asdict` writes it."""
     if "grids" not in plain:
         return AngularGrid(**plain)
     return GridStack(**plain | {"grids": tuple(AngularGrid(**grid) for grid in plain["grids"])})
@@ -164,6 +164,6 @@ def on_car(lidar: Place, camera: PinholeCamera) -> Place:
 
 
 def between(lidar: Place, other: Place) -> Place:
-    """The way from the LiDAR to a camera or another LiDAR, both told in the frame of the car."""
+    """The way from the LiDAR to a camera or another LiDAR, both in the frame of the car."""
     x, y, z = (b - a for a, b in zip(lidar, other, strict=True))
     return x, y, z

@@ -1,4 +1,4 @@
-"""What the stages of a keyframe exchange.
+"""The types that the stages of a keyframe exchange.
 
 Frames: sensor frame x forward, y left, z up; metres, seconds, radians. A box is (7,): centre x, y,
 z, length, width, height, yaw. Velocities are over ground, in sensor axes. Nothing here carries a
@@ -52,9 +52,9 @@ class Detections:
     scores: Floats | None = None
     """(n,) confidences from 0 to 1; None of a detector that has none."""
     velocities: Floats | None = None
-    """(n, 2) over ground, in sensor axes, m/s; None of a detector that does not tell them."""
+    """(n, 2) over ground, in sensor axes, m/s; None without."""
     attributes: Sequence[str] | None = None
-    """(n,) nuScenes attributes, "" where unknown; None of a detector that does not tell them."""
+    """(n,) nuScenes attributes, "" where unknown; None without."""
 
     def __len__(self) -> int:
         return len(self.classes)
@@ -72,15 +72,15 @@ class Detections:
 
 
 class _Table:
-    """Columns of one table. Made of its rows it reads each column off them when that is first asked
-    for, since few ask for all. `len()` is the number of rows n.
+    """Columns of one table. Made from rows, it reads each column when it is first used, since few
+    callers use all. `len()` is the number of rows n.
     """
 
     COLUMNS: ClassVar[tuple[str, ...]]
     _PLACES: ClassVar[Mapping[str, int | slice]]
     """Where in COLUMNS the attributes are."""
     _WHOLE: ClassVar[tuple[str, ...]]
-    """Those that are whole numbers."""
+    """The columns of whole numbers."""
 
     @classmethod
     def from_checked_rows(cls, table: Floats) -> Self:
@@ -241,7 +241,7 @@ def _shared(table: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Demand:
-    """What a policy asks of the allocator (Algorithm 1).
+    """The demand of a policy to the allocator (Algorithm 1).
 
     A set is a list of cells, taken in its order. The paper takes them "in ascending index", and so
     its policies list them (`care_sim.core.cells.order`).
@@ -260,7 +260,7 @@ class Demand:
 
 @dataclass(frozen=True)
 class Scan:
-    """What came back from the fired cells."""
+    """The returns of the fired cells."""
 
     cells: Cells
     """(n,) the fired ones, ascending; one that has two returns comes twice, the nearer first."""
@@ -291,7 +291,7 @@ class Scan:
 
 @dataclass(frozen=True)
 class Command:
-    """What the controller asks of the car."""
+    """The command of the controller to the car."""
 
     acceleration: float
     """m/s^2, below 0 to slow down."""

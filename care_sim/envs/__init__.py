@@ -73,7 +73,7 @@ def make_env(name: str, **arguments: Any) -> gymnasium.Env[Any, Any]:
 def make_scenario_env(scenario: str, **arguments: Any) -> gymnasium.Env[Any, Any]:
     """The environment of a scenario by name or place, without Gymnasium's checker."""
     known = ENVIRONMENT_IDS.get(scenario)
-    # Of another scenario nothing needs to be registered: workers make it by the name alone.
+    # Another scenario needs no registration: workers make it by its name alone.
     any_other = EnvSpec("CARE-Scenario-v0", _ANY_SCENARIO, kwargs={"scenario": scenario})
     spec = f"care_sim:{known}" if known else any_other
     return gymnasium.make(spec, disable_env_checker=True, **arguments)

@@ -17,7 +17,6 @@ from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, detector_o
 from care_sim.envs.worlds import Setting, Worlds
 from care_sim.loops.one_world import OneWorld
 from care_sim.loops.records import Keyframe
-from care_sim.loops.stages.state import Fired
 from care_sim.perception.detectors import PROXY
 from care_sim.scenarios import make_scenario, scenario_class
 from care_sim.scenarios.base import Scenario
@@ -207,27 +206,27 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
         entropy = self._entropy(seed, options)
         self._running = None
         if self._worlds is None:
-            self._worlds = Worlds([self.setting])
-        episode, info = self._worlds.start({0: entropy})[0]
+            self._worlds = Worlds([self.setting], self._choice)
+        info = self._worlds.begin({0: entropy})[0]
         self.keyframes = []
-        self._begin(OneWorld(self._worlds.loop), episode.floor)
+        self._begin(OneWorld(self._worlds.loop))
         return self._observed(self._worlds), info
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
-        """Fire the cells that `action` scores highest and go on to the next keyframe.
+        """Fire the cells that `action` scores highest and advance to the next keyframe.
 
         Raises InvalidInput for an action of the wrong shape or with values that are not finite, and
         gymnasium.error.ResetNeeded before `reset`, after the end, and after an error or interrupt
         in the middle of a step.
         """
         loop, worlds = self.loop, self._worlds
-        fired = self._choose_cells(action)
+        scores = self._taken(action)
         assert worlds is not None
         # An error leaves the world between two keyframes.
         self._over = True
-        stepped = worlds.play(Fired.of([fired]), _HERE)
-        self.keyframes.append(loop.record(fired, worlds.records))
-        info = self._scan_info(fired) | _first(stepped.columns) | stepped.single.get(0, {})
+        stepped = worlds.step(scores, _HERE)
+        self.keyframes.append(loop.record(worlds.records))
+        info = _first(stepped.columns) | stepped.single.get(0, {})
         terminated, truncated = bool(stepped.terminated[0]), bool(stepped.truncated[0])
         self._over = terminated or truncated
         return self._observed(worlds), float(stepped.rewards[0]), terminated, truncated, info
@@ -254,8 +253,12 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
 
 
 def _first(columns: Mapping[str, Any]) -> dict[str, Any]:
-    """The numbers of the first world."""
+    """The numbers and arrays of the first world."""
     return {
-        name: _first(column) if isinstance(column, Mapping) else column[0].item()
+        name: _first(column)
+        if isinstance(column, Mapping)
+        else column[0].copy()
+        if column.ndim > 1
+        else column[0].item()
         for name, column in columns.items()
     }

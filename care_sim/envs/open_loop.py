@@ -27,6 +27,8 @@ from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe, SceneKeyframe
 from care_sim.perception import matching
 from care_sim.perception.detectors import PROXY
 
+_HERE = np.ones(1, np.bool_)
+
 UNFILMED = ("camera_rotation_sigma_deg", "camera_position_sigma_m", "engine")
 """Conditions that a film cannot take on once it is made."""
 
@@ -110,7 +112,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
 
     @property
     def score(self) -> SceneScore:
-        """What was found of the scene; complete once the episode is over."""
+        """The detected objects of the scene; complete once the episode is over."""
         return SceneScore.of(self._sightings, self._masks)
 
     @property
@@ -141,17 +143,19 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         seeds = SensorSeeds(camera, lidar, odometry, luck)
         loop = OpenLoop(film, self.rig, self.conditions, seeds, self._detector)
         info = {"seed": seed, "scene": film.name} if self.scoring_info else {}
-        self._begin(loop, floor)
+        self._begin(loop)
+        self._choice.begin(0, floor)
         return loop.belief.to_observation(), info
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
-        """Fire the cells that `action` scores highest and go on to the next keyframe.
+        """Fire the cells that `action` scores highest and advance to the next keyframe.
 
         Raises InvalidInput for an action of the wrong shape or with values that are not finite, and
         gymnasium.error.ResetNeeded before `reset` and after the end.
         """
         loop = self.loop
-        fired = self._choose_cells(action)
+        counts, cells = self._choice.fired(self._taken(action), _HERE, np.array([loop.index]))
+        fired = cells[0, : counts[0]].copy()
         shot = loop.shot
         record = loop.keyframe(fired)
         found = matching.found_objects(shot.annotations, record.detections)
@@ -159,7 +163,13 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         self._masks.append(found)
         scored = found[self._sightings.scored(record.index)]
         self._over = loop.over
-        info = {**self._scan_info(fired), "time_s": shot.time_s}
+        scan = {"fired": fired, **loop.told}
+        # Without the floor as lists: Gymnasium's vectors stack arrays of one length.
+        info: dict[str, Any] = {
+            name: values.copy() if self.conditions.floor else values.tolist()
+            for name, values in scan.items()
+        }
+        info["time_s"] = shot.time_s
         if self.scoring_info:
             info |= {"objects": len(scored), "found": int(scored.sum())}
         if self._over:

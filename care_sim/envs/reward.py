@@ -99,7 +99,7 @@ class Rewards:
         terms.
 
         `detectable` (W,) says whether a scan of every cell would detect the actor, where
-        `need_bound` asks for it; `over` (W,) whether the episode ends with this keyframe.
+        `need_bound` needs it; `over` (W,) whether the episode ends with this keyframe.
         """
         table = np.zeros((len(REWARD_WEIGHTS), len(who)))
         told = np.array(

@@ -1,4 +1,4 @@
-"""What the environments of both loops share: a rig, its spaces, and its budget.
+"""The base of both loops' environments: a rig, its spaces and its budget.
 
 No action can overspend that budget.
 """
@@ -19,13 +19,13 @@ from care_sim.core.arrays import Floats
 from care_sim.core.belief import MAX_DETECTIONS, MAX_TRACKS, OBSERVED
 from care_sim.core.cells.stack import Grid
 from care_sim.core.conditions import MIN_RETURNS, Conditions
-from care_sim.core.firing.floor import Floor, floor_key
 from care_sim.core.firing.listing import hardware_of
 from care_sim.core.grid import Cells, Place
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action
 from care_sim.loops.observation_limits import Limits
+from care_sim.loops.stages.choice import Choice
 from care_sim.loops.truth import Truth, Watchable
 from care_sim.perception.detectors import CLUSTER, PROXY, check_detector, make_detector
 from care_sim.perception.points_only import Detector
@@ -59,7 +59,7 @@ def checked_scores(action: NDArray[np.floating], shape: tuple[int, ...]) -> NDAr
     if scores.dtype.kind not in "biuf":
         raise InvalidInput(f"action must hold numbers, got {scores.dtype}")
     if scores.dtype != np.float32:
-        # What overflows float32 becomes infinite, and is refused below.
+        # Overflow of float32 becomes infinite, which the check below refuses.
         with np.errstate(over="ignore"):
             scores = scores.astype(np.float32)
     if not np.isfinite(scores).all():
@@ -119,7 +119,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
 
     acted: NDArray[np.float32]
     conditions_kind: ClassVar[type[Conditions]] = Conditions
-    """What its conditions are made as."""
+    """The class of its conditions."""
 
     def __init__(
         self,
@@ -167,8 +167,8 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         )
         self.action_space = spaces.Box(0.0, 1.0, grid.shape, np.float32)
         self.observation_space = observation_space(self.rig)
+        self._choice = Choice(self._rig, conditions, np.array([self._rig.budget]))
         self._running: AnyLoop | None = None
-        self._keyframe = 0
         self._over = False
 
     @property
@@ -197,7 +197,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
 
     @property
     def truth(self) -> Truth:
-        """What privileged policies may ask for; `make_policy` hands it to them alone."""
+        """The truth that privileged policies may read; `make_policy` gives it to them alone."""
         return Truth(self)
 
     def _entropy(self, seed: int | None, options: dict[str, Any] | None) -> int:
@@ -212,22 +212,17 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
                 f"reset takes no options, got {shown(options)}; what an episode is made of are "
                 "arguments of the environment"
             )
-        if seed is None:
-            return int(self.np_random.integers(2**32))
-        check_seed(seed)
-        super().reset(seed=int(seed))
-        return int(seed)
+        if seed is not None:
+            check_seed(seed)
+        return entropy_of(self, seed)
 
-    def _begin(self, loop: AnyLoop, floor: np.random.SeedSequence) -> None:
-        """Start an episode over a loop and a floor."""
+    def _begin(self, loop: AnyLoop) -> None:
+        """Start an episode over a loop."""
         self._running = loop
         self._over = False
-        self._floor_key = floor_key(floor, self.conditions.floor_seed)
-        self._keyframe = 0
-        self._last_fired = np.empty(0, np.int64)
 
-    def _choose_cells(self, action: Action) -> Cells:
-        """Take an action: the cells that it fires at the coming keyframe.
+    def _taken(self, action: Action) -> NDArray[np.float32]:
+        """Take an action: its scores (1, E, A), as of one world of many.
 
         Raises InvalidInput for an action of the wrong shape or with values that are not finite, and
         gymnasium.error.ResetNeeded before `reset` and after the end.
@@ -235,10 +230,8 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         if self._over:
             raise gymnasium.error.ResetNeeded("the episode is over: call reset()")
         # A copy, since the caller may write into an action once it is taken.
-        self.acted = scores = checked_scores(action, self.rig.grid.shape).copy()
-        self._last_fired = fired = self._fired(scores)
-        self._keyframe += 1
-        return fired
+        self.acted = checked_scores(action, self.rig.grid.shape).copy()
+        return self.acted[None]
 
     def would_fire(self, action: Action) -> Cells:
         """The cells, ascending, that an action would fire at the coming keyframe, which it leaves
@@ -246,21 +239,18 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
 
         Raises InvalidInput for an action of the wrong shape or with values that are not finite.
         """
-        return self._fired(checked_scores(action, self.rig.grid.shape))
+        scores = checked_scores(action, self.rig.grid.shape)
+        return self._choice.would_fire(0, scores, self.loop.index)
 
-    def _fired(self, scores: Action) -> Cells:
-        floor = Floor(*self._floor_key, self._keyframe) if self.conditions.floor else None
-        return self.rig.hardware.fire(scores, self.rig.budget, floor, self._last_fired)
 
-    def _scan_info(self, fired: Cells) -> dict[str, Any]:
-        """The fired cells and what their returns told, as `info` holds them, in copies.
-
-        Without the floor they are lists, since Gymnasium's vector environments stack arrays of one
-        length.
-        """
-        scan = {"fired": fired, **self.loop.told}
-        floor = self.conditions.floor
-        return {name: values.copy() if floor else values.tolist() for name, values in scan.items()}
+def entropy_of(env: gymnasium.Env[Any, Any], seed: int | None) -> int:
+    """The seed of an episode: the given one, with which the generator of `env` begins anew, or else
+    a draw of that generator.
+    """
+    if seed is None:
+        return int(env.np_random.integers(2**32))
+    gymnasium.Env.reset(env, seed=int(seed))
+    return int(seed)
 
 
 def split_conditions(
@@ -277,7 +267,7 @@ def split_conditions(
 
 
 def arguments_of(kind: type[SensingEnv[Any]]) -> list[str]:
-    """What an environment's class takes by name: its own arguments and the conditions."""
+    """Return the keyword arguments of an environment's class: its own and the conditions."""
     # Each class of the family names some arguments and hands the rest on.
     made = [
         vars(one)["__init__"]

@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from gymnasium.utils import seeding
 from numpy.typing import NDArray
 
 from care_sim.base.times import LAST_BITS_S
@@ -71,8 +70,8 @@ class History:
         self._all = np.arange(worlds)
 
     def note(self, keyframes: Integers, records: Records) -> None:
-        """Keep the records of the `keyframes` (W,); a world that rests keeps them until it goes
-        on.
+        """Keep the records of the `keyframes` (W,); a resting world keeps them until it plays
+        again.
         """
         self._table[keyframes, self._all] = np.array(records, float).T
 
@@ -102,7 +101,8 @@ class Stepped(NamedTuple):
 
 class Worlds:
     """A loop over a world for each of the `settings`, which differ at most in budget, camera and
-    detector. Each writes the observation of its coming keyframe into its row of `observed`.
+    detector. The `choice` is that of their cells. Each world writes the observation of its coming
+    keyframe into its row of `observed`.
 
     Unless `exact`, clearances that no reward needs are bounds (`Loop`); outcomes are exact.
     `one_budget` says whether all worlds of the vector environment, those of other threads too, fire
@@ -115,6 +115,7 @@ class Worlds:
     def __init__(
         self,
         settings: Sequence[Setting],
+        choice: Choice,
         observed: Observed | None = None,
         exact: bool = True,
         one_budget: bool = True,
@@ -125,7 +126,7 @@ class Worlds:
         self._first = first = settings[0]
         self._exact = exact
         rigs, conditions = [each.rig for each in settings], [each.conditions for each in settings]
-        self._budgets = np.array([rig.budget for rig in rigs])
+        self._choice = choice
         self._one_budget = one_budget
         duration_s = first.scenario.duration_s
         detectors = [each.detector for each in settings]
@@ -137,45 +138,29 @@ class Worlds:
         self._is_drive = isinstance(first.scenario, DriveScenario)
         self._sights: list[list[tuple[Sight, ...]]] = [[] for _ in settings]
         self._built: dict[int, World] = {}
-        self._choice: Choice | None = None
-        # Each world draws the seeds of its later episodes as a single environment does.
-        self._generators: list[np.random.Generator | None] = [None] * worlds
 
-    def begin(self, seeds: Mapping[int, int | None]) -> dict[int, dict[str, Any]]:
-        """Begin an episode in those that have a seed or None here, as `reset` of the single
-        environment does with it; their infos.
-        """
-        entropies = {world: self._entropy(world, seed) for world, seed in seeds.items()}
-        if self._choice is None:
-            self._choice = Choice(self._first.rig, self._first.conditions, self._budgets)
-        infos = {}
-        for world, (episode, info) in self.start(entropies).items():
-            self._choice.begin(world, episode.floor)
-            infos[world] = info
-        return infos
-
-    def start(self, entropies: Mapping[int, int]) -> dict[int, tuple[Episode, dict[str, Any]]]:
-        """Begin the episodes of seeds, by world; each with its info."""
-        begun = {}
-        for world, entropy in entropies.items():
+    def begin(self, seeds: Mapping[int, int]) -> dict[int, dict[str, Any]]:
+        """Begin the episodes of `seeds`, by world; return the infos, by world."""
+        episodes, infos = {}, {}
+        for world, entropy in seeds.items():
             setting = self._settings[world]
             if world in self._built:
                 self._built.pop(world).close()
             pool = setting.pool(entropy)
-            episode = setting.episode(entropy)._replace(pool=pool)
+            episode = episodes[world] = setting.episode(entropy)._replace(pool=pool)
             built = self._built[world] = episode.world
+            self._choice.begin(world, episode.floor)
             self._rewards.begin(world)
             self._sights[world] = []
             drawn = {"drawn": dict(built.drawn)} if built.drawn else {}
-            begun[world] = episode, {"seed": entropy, **drawn} if setting.scoring_info else {}
-        self.loop.begin({world: episode for world, (episode, _) in begun.items()})
-        return begun
+            infos[world] = {"seed": entropy, **drawn} if setting.scoring_info else {}
+        self.loop.begin(episodes)
+        return infos
 
     def step(self, actions: NDArray[np.float32], who: Mask) -> Stepped:
         """Let those play that are True in `who` (n,), with their rows of `actions` (n, E, A)."""
-        assert self._choice is not None
         fired = self._choice.fired(actions, who, self.loop.state.keyframes)
-        stepped = self.play(fired, who)
+        stepped = self._played(fired, who)
         told = {
             world: {"fired": fired.cells[world, : fired.counts[world]]} | self.loop.told(world)
             for world in _places(who)
@@ -189,16 +174,16 @@ class Worlds:
         return stepped
 
     def _columns(self, told: Mapping[int, Mapping[str, np.ndarray]]) -> dict[str, NDArray[Any]]:
-        """Return the columns of what was `told` of the cells: (W, B), or (W,) arrays of each
-        world's own where budgets differ.
+        """Return the scan data `told` as columns: (W, B), or (W,) arrays of each world's own where
+        budgets differ.
         """
-        conditions, worlds = self._first.conditions, len(self._budgets)
+        conditions, worlds = self._first.conditions, len(self._settings)
         # There are columns even where nobody plays, to be joined with those of other threads.
         kinds: dict[str, type] = {"fired": np.int64}
         kinds |= {"intensities": np.float64} if conditions.shapes_beams else {}
         kinds |= {"times_s": np.float64} if conditions.lidar_sweep_s else {}
-        shape = (worlds, self._budgets[0]) if self._one_budget else (worlds,)
-        columns = {
+        shape = (worlds, self._first.rig.budget) if self._one_budget else (worlds,)
+        columns: dict[str, NDArray[Any]] = {
             name: np.zeros(shape, kind if self._one_budget else object)
             for name, kind in kinds.items()
         }
@@ -207,10 +192,8 @@ class Worlds:
                 column[world] = own[name] if self._one_budget else own[name].copy()
         return columns
 
-    def play(self, fired: Fired, who: Mask) -> Stepped:
-        """Let those play that are True in `who` (n,), and fire these cells; without what infos tell
-        of them.
-        """
+    def _played(self, fired: Fired, who: Mask) -> Stepped:
+        """Play the worlds `who` (n,) with these cells fired; the columns lack scan data."""
         # Asked before the keyframe, which moves the worlds on, and only while it is needed: it
         # costs rays.
         loop, first = self.loop, self._first
@@ -263,16 +246,6 @@ class Worlds:
             return result
         appeared = float(episode.time_s[episode.in_view.argmax()])
         return replace(result, clearance_m=self.loop.motion.settle(world, appeared))
-
-    def _entropy(self, world: int, seed: int | None) -> int:
-        if seed is not None:
-            self._generators[world], _ = seeding.np_random(int(seed))
-            return int(seed)
-        generator = self._generators[world]
-        if generator is None:
-            generator, _ = seeding.np_random()
-            self._generators[world] = generator
-        return int(generator.integers(2**32))
 
 
 def _places(who: Mask) -> list[int]:

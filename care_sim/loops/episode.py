@@ -22,8 +22,8 @@ class SensorSeeds(NamedTuple):
 
 class EpisodeSeeds(NamedTuple):
     """The streams that the seed of an episode holds: of the scenario, the sensors, the floor, and
-    of another drive through the scenario, from which false boxes are drawn. Nothing in that one
-    tells of the episode.
+    of another drive through the scenario, from which false boxes are drawn. The other drive reveals
+    nothing about the episode.
     """
 
     scenario: SeedSequence
@@ -33,7 +33,7 @@ class EpisodeSeeds(NamedTuple):
 
     @classmethod
     def of(cls, entropy: int, secret: str = "") -> "EpisodeSeeds":
-        """Those of a seed; see `care_sim.base.seeds`."""
+        """Return the streams of a seed; see `care_sim.base.seeds`."""
         # Their order is a part of what a seed means.
         scenario, camera, lidar, floor, odometry, another, detector = streams((entropy,), 7, secret)
         return cls(scenario, SensorSeeds(camera, lidar, odometry, detector), floor, another)

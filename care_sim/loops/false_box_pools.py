@@ -36,8 +36,8 @@ def pool_of_another_drive(
     seeds: SensorSeeds,
     detector: Detector | None = None,
 ) -> BoxPool:
-    """Drive through `world`, every cell fired, and close it: what the camera shows before misses
-    and delay.
+    """Drive through `world`, every cell fired, and close it: return the camera's boxes before
+    misses and delay.
 
     The car brakes as a full scan in clear air makes it brake, every pulse a plain ray, whatever the
     policy and the returns of the episode: all of them meet the same false boxes. The true boxes of
@@ -59,7 +59,7 @@ def pool_of_another_drive(
         times_s = []
         over = False
 
-        # What the camera shows is taken before each keyframe, as the episode takes it.
+        # The picture is taken before each keyframe, as in the episode.
         while not over:
             seen.append(loop.faultless(loop.mounted))
             times_s.append(loop.world.time)

@@ -1,4 +1,4 @@
-"""What the open loop replays: the keyframes of a scene, the same for every policy.
+"""Films: the keyframes of a scene that the open loop replays, the same for every policy.
 
 A film is made once, from a generated street, a recorded drive whose boxes become bodies, or
 recorded clouds. Nothing in it depends on a policy. It holds truth; policies see of it what
@@ -50,13 +50,13 @@ class Shot:
 class Film:
     """A scene: its name, the cameras of its car, the LiDAR's height above the road, seconds between
     keyframes, the grid whose cells its clouds hold, the `place` (x, y) of the LiDAR, of several the
-    first, on the car, the default one where a recording does not tell it, and the settings of the
-    `returns` that its clouds hold.
+    first, on the car, the default one where a recording lacks it, and the settings of the `returns`
+    that its clouds hold.
 
-    `hidden` are the objects that its source annotates at the first keyframe though no sensor tells
-    of them there: neither a return nor a pixel. No shot annotates them, so nobody has to find them;
-    they were present all the same. `detected` says that a detector made what the cameras have seen:
-    it errs by itself.
+    `hidden` are the objects that its source annotates at the first keyframe though no return and no
+    pixel shows them there. No shot annotates them, so nobody has to find them; they were present
+    all the same. `detected` says that a detector made what the cameras have seen: it errs by
+    itself.
     """
 
     name: str

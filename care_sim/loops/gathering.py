@@ -27,7 +27,7 @@ def gather_sweeps(returned: Cloud, fire: Callable[[Cloud], Cloud], shot: Shot) -
 
 
 class Gathering:
-    """The last sweeps of the closed loop, as many as a detector asks for."""
+    """The last sweeps of the closed loop, as many as a detector needs."""
 
     def __init__(self, sweeps: int, keyframe_s: float):
         self._earlier: deque[tuple[Frame, Cloud]] = deque(maxlen=sweeps - 1)

@@ -98,9 +98,9 @@ class Loop:
 
     def keyframe(self, fired: Fired, who: Mask) -> Records:
         """Fire the cells in the worlds `who` (W,), act on what came back, and move these worlds on
-        to their next keyframe. What the records say of the others means nothing.
+        to their next keyframe. Records of the other worlds mean nothing.
         """
-        # What is recorded of the scan is taken before the worlds move on.
+        # The scan's columns are copied before the worlds move on.
         state = self.state
         state.live[:] = who
         time = state.times.copy()
@@ -207,7 +207,7 @@ class Loop:
                 self.sight.look_between(self.state, world)
 
     def _look(self, who: Mask) -> None:
-        """Take the cameras' pictures and write what the policies of the worlds `who` are told."""
+        """Take the cameras' pictures and write the observations of the worlds `who`."""
         state = self.state
         state.live[:] = who
         if self._reads_worlds:

@@ -1,13 +1,13 @@
-"""Braking for nothing, told from the truth.
+"""Needless braking, judged by the truth.
 
 A keyframe with the brake on is needless if no body, reported or not, lies in the strip ahead that
 the controller guards, nor would enter it within the controller's horizon if it kept its velocity.
 The time for which the controller waits until it lets go does not count.
 
 A brake for what a detector made up is unfounded: it is needless, and no track in the strip touches
-a body, reported or not. Who misjudges the speed or the size of a body has made nothing up. The
-first-sighting actor is no such body, and no reason to brake, while neither the camera has shown
-that actor nor a detection has held its returns.
+a body, reported or not. A detector that misjudges the speed or size of a real body has invented
+nothing. The first-sighting actor is no such body, and no reason to brake, while neither the camera
+has shown that actor nor a detection has held its returns.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
-"""What an observation can hold: the bounds of its numbers, and which rows its tables keep.
+"""The limits of observations: the bounds of their numbers, and the rows that their tables keep.
 
-Both loops ask here. A bound is what the sensors can tell. What goes beyond is mended before a
-policy or the controller reads it, column by column:
+Both loops use them. A bound is the most that the sensors can measure. Numbers beyond are mended,
+column by column, before a policy or the controller reads them:
 
 | columns | bound | beyond it |
 |---|---|---|
@@ -51,12 +51,12 @@ class Limits:
 
     @cached_property
     def ego(self) -> Floats:
-        """Of speed, yaw rate and acceleration."""
+        """Bounds of speed, yaw rate and acceleration."""
         return np.array([np.negative(_EGO), _EGO])
 
     @cached_property
     def detections(self) -> Floats:
-        """Of `ImageDetections.COLUMNS`, over all cameras; class -1 pads."""
+        """Bounds of `ImageDetections.COLUMNS`, over all cameras; class -1 pads."""
         least, most = self._pictured
         return np.stack([np.r_[-1.0, least[1:]], most.max(axis=0)])
 
@@ -67,7 +67,7 @@ class Limits:
 
     @cached_property
     def tracks(self) -> Floats:
-        """Of `Tracks.COLUMNS`; id -1 pads."""
+        """Bounds of `Tracks.COLUMNS`; id -1 pads."""
         far = 2 * self.rig.grid.range_m
         classes = len(CLASSES) - 1
         counts = [HIGHEST, HIGHEST]
@@ -79,8 +79,8 @@ class Limits:
     def belief(
         self, ego: Ego, detections: ImageDetections, tracks: Tracks, ranges: np.ndarray
     ) -> Belief:
-        """What a policy is told of a keyframe, within the limits. `tracks` come nearest first,
-        `ranges` (E, A) lie between 0 and the reach.
+        """Return the belief of a keyframe, within the limits. `tracks` come nearest first, `ranges`
+        (E, A) lie between 0 and the reach.
         """
         detections = self._limited_detections(detections)
         tracks = self._fitting(self._limited_tracks(tracks), detections)
@@ -120,7 +120,7 @@ class Limits:
         return np.array([0, 0, *[0] * 4, 0, 0, -MAX_TURN]), most
 
     def _limited_detections(self, detections: ImageDetections) -> ImageDetections:
-        # Where nothing lies beyond the limits the detections are handed on as they are.
+        # Detections within the limits are returned as they are.
         if self._fit(detections):
             return detections
         least, most = self._pictured
@@ -152,7 +152,7 @@ class Limits:
         shown = Tracks.from_rows(tracks.rows().astype(np.float32))
         seen = ImageDetections.from_rows(detections.rows().astype(np.float32))
         first = explaining_tracks(seen, shown, self.rig)
-        # Those that explain something come first; a stable sort leaves both kinds nearest first.
+        # Tracks that explain something come first; a stable sort leaves both kinds nearest first.
         order = np.ones(len(tracks), np.int64)
         order[first[first >= 0]] = 0
         return tracks.take(np.sort(np.argsort(order, kind="stable")[:MAX_TRACKS]))

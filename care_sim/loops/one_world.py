@@ -19,7 +19,7 @@ from care_sim.loops.records import Keyframe, Records
 from care_sim.loops.stages.scanning import lidar_of
 from care_sim.loops.stages.sight import photographed
 from care_sim.loops.stages.state import Fired
-from care_sim.loops.truth import Told, TrackObjects
+from care_sim.loops.truth import TrackObjects
 from care_sim.perception.points_only import Detector
 from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.engines import make_engine
@@ -62,17 +62,18 @@ class OneWorld:
         paper's proxy detects what enough fired rays hit.
         """
         loop = Loop([rig], [conditions], duration_s, [detector])
-        # Whoever chooses the cells needs no floor.
+        # The caller chooses the cells, so no floor is needed.
         loop.begin({0: Episode(world, seeds, _NO_FAULT, pool)})
         return cls(loop)
 
     def keyframe(self, fired: Cells) -> Keyframe:
         """Fire `fired`, act on what came back, and move on to the next keyframe."""
-        return self.record(fired, self._loop.keyframe(Fired.of([fired]), _HERE))
+        return self.record(self._loop.keyframe(Fired.of([fired]), _HERE))
 
-    def record(self, fired: Cells, records: Records) -> Keyframe:
+    def record(self, records: Records) -> Keyframe:
         """The record of the keyframe that the loop has played since."""
         loop, found, impact = self._loop, self._loop.found, self._loop.impacts.get(0)
+        counts, cells = loop.fired
         self._objects.note(found.tracks[0, : found.counts[0]], found.behind(0))
         columns: Iterable[np.ndarray] = records
         told: dict[str, Any] = {
@@ -80,7 +81,7 @@ class OneWorld:
         }
         told |= {
             "index": self.index,
-            "fired": fired,
+            "fired": cells[0, : counts[0]].copy(),
             "impact_speed_mps": impact.speed_mps if impact else None,
             "impact": impact,
             "sights": loop.sights.get(0, ()),
@@ -90,7 +91,7 @@ class OneWorld:
 
     @property
     def world(self) -> World:
-        """The world at the coming keyframe. Its bodies are moved there when it is asked for."""
+        """The world at the coming keyframe. Reading it moves its bodies there."""
         return self._loop.world(0)
 
     @property
@@ -102,11 +103,6 @@ class OneWorld:
     def guarded_m(self) -> float:
         """Width of the strip ahead that the driver guards, metres."""
         return self._loop.driving.guarded_m
-
-    @property
-    def told(self) -> Told:
-        """What the returns of the last keyframe told besides their ranges."""
-        return self._loop.told(0)
 
     @property
     def belief(self) -> Belief:
@@ -156,7 +152,7 @@ class OneWorld:
         return self._lidar.bodies(self.sensor)
 
     def full_scan(self) -> Scan:
-        """What every cell would return now, before noise and dropout. Truth: for the privileged
+        """Return the scan of all cells now, before noise and dropout. Truth: for the privileged
         alone.
         """
         return self._lidar.peek(self.sensor)
@@ -178,8 +174,8 @@ class OneWorld:
         return self._loop.shows(0, body)
 
     def faultless(self, cameras: tuple[PinholeCamera, ...] | None = None) -> IdentifiedDetections:
-        """What a detector without faults would report of `cameras`, those of the rig unless given.
-        Truth: for scoring and people.
+        """Return the faultless detections of `cameras`, by default those of the rig. Truth: for
+        scoring and people.
         """
         world, taken = self.world, cameras or self.rig.cameras
         labels, engine = world.labels(), self._loop.conditions.engine
@@ -189,7 +185,7 @@ class OneWorld:
 
     @property
     def mounted(self) -> tuple[PinholeCamera, ...]:
-        """The cameras as they really stand."""
+        """The cameras at their true mounts."""
         own = self._loop.sight.own_cameras.get(0)
         return self.rig.cameras if own is None else own.detector.mounted
 

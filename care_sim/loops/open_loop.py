@@ -59,7 +59,7 @@ class OpenLoop:
     belief: Belief
     """All that a policy may know when it chooses the cells."""
     told: Told
-    """What the returns of the last keyframe told besides their ranges."""
+    """Return data of the last keyframe besides ranges."""
     handed: Cloud
     """The returns that the detector was given at the last keyframe. None before the first one, and
     none in a copy: sweeps are large, and a copy plays on without them.
@@ -81,7 +81,7 @@ class OpenLoop:
         objects = sorted(
             {number for shot in film.shots for number in shot.annotations.objects.tolist()}
         )
-        # The camera errs object by object, so it is told of all that the film will ever show.
+        # The camera errs object by object, so it needs all objects of the film.
         self._rows = {number: row for row, number in enumerate(objects)}
         self._lidar = RecordedLidar(rig.grid, sensing, seeds.lidar)
         pool = pool_of_film(film) if invents_boxes(sensing) else EMPTY_POOL
@@ -117,7 +117,7 @@ class OpenLoop:
         return self.film.shots[self.index]
 
     def keyframe(self, fired: Cells) -> OpenLoopKeyframe:
-        """Fire `fired`, detect on what came back, and go on to the next keyframe."""
+        """Fire `fired`, detect on the returns, and advance to the next keyframe."""
         index = self.index
         shot = self.shot
 
@@ -174,7 +174,7 @@ class OpenLoop:
         return self._arrived.objects[self._limits.kept_detections(self._arrived.detections)]
 
     def full_scan(self) -> Scan:
-        """What every cell would return now, before noise and dropout. Truth: for the privileged
+        """Return the scan of all cells now, before noise and dropout. Truth: for the privileged
         alone.
         """
         return Scan(
@@ -210,9 +210,9 @@ class OpenLoop:
 
 @dataclass(frozen=True)
 class SceneKeyframe:
-    """What a keyframe found of the annotated objects (n,) of its shot: which were `found`, which
-    are `scored`, within range, and which are `appearing`, their first sighting. `time_s` is from
-    the start; `record` is None before the first scan.
+    """The annotated objects (n,) of a keyframe: which were `found`, which are `scored` (within
+    range), and which are `appearing` (their first sighting). `time_s` is from the start; `record`
+    is None before the first scan.
 
     Truth: never for a policy.
     """

@@ -1,4 +1,4 @@
-"""What an episode leaves behind for the scoring: a record per keyframe, and the outcome."""
+"""Records of an episode for the scoring: one per keyframe, and the outcome."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,14 +27,14 @@ class Sight:
 class Keyframe:
     """The record of one keyframe of the closed loop, from which every metric is computed.
 
-    Scoring only: it holds truth. The first-sighting actor is the one whom the episode is about.
-    Without one, distances are inf.
+    Scoring only: it holds truth. The first-sighting actor is the subject of the episode. Without
+    one, distances are inf.
     """
 
     index: int
     """The number of the keyframe, from 0."""
     time_s: float
-    """Of the scan, seconds from the start."""
+    """Time of the scan, seconds from the start."""
     fired: Cells
     """(n,) the cells that were fired, ascending; one that was fired several times stands there as
     often."""
@@ -55,9 +55,9 @@ class Keyframe:
     impact_speed_mps: float | None
     """The car's own speed at its first contact with any body until the next keyframe, else None."""
     impact: Impact | None = None
-    """That contact."""
+    """The contact at which `impact_speed_mps` was measured."""
     sights: tuple[Sight, ...] = ()
-    """Of `World.meetings`, in their order."""
+    """Sights of `World.meetings`, in their order."""
     needless: bool = False
     """Whether the brake was on with nothing to brake for; see `care_sim.loops.needless`. Judged in
     drives alone.
@@ -81,9 +81,9 @@ class Outcome:
     which it is detected; None if it never is.
     """
     undetected_to_m: float | None
-    """Of an actor that is never detected, the least distance at which a scan passed it by since it
-    came into view, or in the whole episode if it never did. It is the most that the detection
-    distance can have been. Else None, and in an episode without an actor.
+    """The least distance at which a scan missed an actor that is never detected, since it came into
+    view, or in the whole episode if it never did. The detection distance is at most this. None if
+    the actor is detected or there is none.
     """
     braked: bool
     """Whether the brake was on at any keyframe."""
@@ -145,8 +145,8 @@ class EncounterOutcome:
 
 @dataclass(frozen=True)
 class DriveOutcome(Outcome):
-    """The result of a drive. What `Outcome` says of the first-sighting actor is of the first
-    encounter that is a conflict, of the first encounter where none is, and None without any.
+    """The result of a drive. The first-sighting actor of `Outcome` is the first conflict, else the
+    first encounter; without encounters its columns are None.
     """
 
     hit_standing: bool | None
@@ -180,7 +180,7 @@ class Records(NamedTuple):
 
     @classmethod
     def of(cls, keyframes: Sequence[Keyframe]) -> "Records":
-        """Those of an episode."""
+        """Return the records of an episode as columns."""
         columns = {name: [getattr(one, name) for one in keyframes] for name in cls._fields}
         columns["fired"] = [len(one.fired) for one in keyframes]
         # None, where nothing was hit, becomes NaN.
@@ -188,7 +188,7 @@ class Records(NamedTuple):
 
 
 def kind_of(column: str) -> type:
-    """What the numbers of a column are."""
+    """Return the type of a column's numbers."""
     kinds: dict[str, type] = {"fired": np.int64} | dict.fromkeys(
         ("in_view", "detected", "braking", "needless", "unfounded"), np.bool_
     )

@@ -1,6 +1,6 @@
-"""What is true about the coming keyframe: for privileged policies, scoring and training alone.
+"""The truth about the coming keyframe, for privileged policies, scoring and training alone.
 
-Truth is asked of the running loop and never enters a `Belief`. And what returns tell besides their
+Truth is read from the running loop and never enters a `Belief`. Also the return data besides
 ranges, for `info`.
 """
 
@@ -25,7 +25,7 @@ def told_by(
 ) -> Told:
     """The columns (k,) of returns of ascending `cells` (k,) as numbers of the `fired` ones,
     ascending too: of several returns of a cell the first, of a cell fired several times the same
-    for each. A column that is None tells nothing.
+    for each. Columns that are None are left out.
     """
     if intensities is None and times_s is None:
         return {}
@@ -40,16 +40,14 @@ def told_by(
 
 
 class Watchable(Protocol):
-    """What environments and privileged policies ask of a loop, besides its keyframes."""
+    """The part of a loop that environments and privileged policies read, besides its keyframes."""
+
+    index: int
+    """The number of the coming keyframe, from 0."""
 
     @property
     def belief(self) -> Belief:
         """All that a policy may know when it chooses the cells."""
-        ...
-
-    @property
-    def told(self) -> Told:
-        """What the returns of the last keyframe told besides their ranges."""
         ...
 
     def true_boxes(self, tracks: Tracks) -> Floats:
@@ -57,7 +55,7 @@ class Watchable(Protocol):
         ...
 
     def full_scan(self) -> Scan:
-        """What every cell would return now, before noise and dropout."""
+        """Return the scan of all cells now, before noise and dropout."""
         ...
 
 
@@ -66,7 +64,7 @@ class Truth:
     episode.
 
     `make_policy` hands it to subclasses of `PrivilegedPolicy` and to nobody else. `Policy.told`
-    leads to public settings alone.
+    holds public settings alone.
     """
 
     def __init__(self, env: Any):
@@ -81,9 +79,7 @@ class Truth:
         return boxes
 
     def full_scan(self) -> Scan:
-        """What a scan of every cell would return, before noise and dropout; `cells` are all cells,
-        ascending.
-        """
+        """Return the scan of all cells, before noise and dropout; `cells` ascend."""
         scan: Scan = self._env.loop.full_scan()
         return scan
 
@@ -110,7 +106,7 @@ class TrackObjects:
         `boxes_of` gives the present sensor-frame boxes of objects, and leaves out those that are
         nowhere.
         """
-        # All objects are asked for at once: the closed loop reads their boxes off one table.
+        # All objects are read at once: the closed loop reads their boxes off one table.
         behind = self.behind(tracks).tolist()
         present = boxes_of([number for number in behind if number != NO_OBJECT])
         boxes = tracks.boxes.copy()

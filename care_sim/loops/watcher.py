@@ -25,14 +25,14 @@ from care_sim.world.bodies import CATALOGUE
 from care_sim.world.world import Actor, World
 
 WAY_M = 40.0
-"""How far ahead of the sensor the car's way is told."""
+"""Length of the shown way ahead of the sensor."""
 _PIECES = 40
-"""Of a way that may bend."""
+"""Pieces of a way that may bend."""
 
 
 def sought(world: World) -> list[Actor]:
-    """Whom the episode is about: everybody whom a drive lets the ego meet, in the order of the way,
-    else the first-sighting actor; empty without either.
+    """Return the subjects of an episode: the actors that a drive lets the ego meet, in the order of
+    the way, else the first-sighting actor; empty without either.
     """
     if world.meetings:
         actors = {actor.body: actor for actor in world.actors}
@@ -63,7 +63,7 @@ def returned(ranges: NDArray[np.floating], grid: Grid) -> tuple[Cells, Floats]:
 
 @dataclass(frozen=True)
 class TrueSituation:
-    """What is there when the cells of a keyframe are chosen, and what of it the policy was shown.
+    """The scene when the cells of a keyframe are chosen, and the part that the policy was shown.
     Boxes are in the world frame. Truth: for people and scoring, never for a policy.
     """
 
@@ -92,7 +92,7 @@ class TrueSituation:
     false: Mask
     """(k,) which of them show nothing."""
     missed: ImageDetections
-    """Those that the camera without its faults would have given besides."""
+    """Detections that a faultless camera would have added."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class Watched:
 
 
 class Watcher:
-    """Follows the running episode of a loop: `situation` is asked before every keyframe, `watched`
+    """Follows the running episode of a loop: call `situation` before every keyframe, `watched`
     after it.
 
     `confidence` is the threshold of the camera's detector.
@@ -160,7 +160,7 @@ class Watcher:
 
 
 def _of_world(loop: OneWorld) -> dict[str, Any]:
-    """What is there around a world's ego."""
+    """The surroundings of a world's ego."""
     world = loop.world
     pieces = 1 if world.route is None else _PIECES
     middles = (np.arange(pieces) + 0.5) * WAY_M / pieces
@@ -177,7 +177,7 @@ def _of_world(loop: OneWorld) -> dict[str, Any]:
 
 
 def _of_film(loop: OpenLoop) -> dict[str, Any]:
-    """What is there in a film's keyframe."""
+    """The surroundings in a film's keyframe."""
     shot, (x, y, height), size = loop.shot, loop.film.position, CATALOGUE["ego"].size
     car = np.array([[-x, -y, size[2] / 2 - height, *size, 0.0]])
     annotations = shot.annotations

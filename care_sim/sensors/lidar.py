@@ -287,10 +287,7 @@ class RecordedLidar:
     def ranges(self, cloud: Cloud) -> Floats:
         """(N,) the nearest return of every cell in metres, inf without one."""
         nearest = np.full(self.grid.size, np.inf)
-        # Cells come ascending, so the returns of each are one stretch.
-        cells, starts = np.unique(cloud.cells, return_index=True)
-        ranges = self.grid.ranges_to(cloud.cells, cloud.points)
-        nearest[cells] = np.minimum.reduceat(ranges, starts)
+        np.minimum.at(nearest, cloud.cells, self.grid.ranges_to(cloud.cells, cloud.points))
         return nearest
 
     def _moved(

@@ -46,9 +46,9 @@ from care_sim.certify.trail import (
 from care_sim.certify.verdict import verdict_of
 from care_sim.commands.certify import certify
 from care_sim.commands.options.results import Certify
-from care_sim.core.firing import base
 from care_sim.core.types import ImageDetections, Tracks
 from care_sim.loops.needless import NeedlessBraking
+from care_sim.loops.stages.choice import Choice
 from care_sim.loops.stages.driving import Driving
 from care_sim.loops.stages.motion import Motion
 from care_sim.loops.stages.scanning import Scanning
@@ -196,9 +196,11 @@ def longer(returns):
     return returns
 
 
-def other(cells):
+def other(fired):
+    cells = fired.cells[0, : fired.counts[0]]
     free = np.setdiff1d(np.arange(16384), cells)[:1]
-    return np.sort(np.concatenate([cells[:-1], free]))
+    cells[:] = np.sort(np.concatenate([cells[:-1], free]))
+    return fired
 
 
 def moved(_none, motion, _state, _accelerations):
@@ -216,7 +218,7 @@ def drifted(_none, _tracking, state):
         (Motion, "_step", 4, moved, "CARE-Dense-v0", (TRAIL_STAGES[0], 2)),
         (Seeing, "look", 3, wider, "CARE-Dense-v0", (TRAIL_STAGES[1], 2)),
         (Tracking, "predict", 2, drifted, "CARE-Dense-v0", (TRAIL_STAGES[2], 2)),
-        (base, "fired_cells", 3, other, "CARE-Dense-v0", (TRAIL_STAGES[3], 2)),
+        (Choice, "fired", 3, other, "CARE-Dense-v0", (TRAIL_STAGES[3], 2)),
         (Scanning, "scan", 3, longer, "CARE-Dense-v0", (TRAIL_STAGES[4], 2)),
         (
             RecordedLidar,

@@ -109,7 +109,7 @@ def _extreme_points(corners: Floats) -> Floats:
 
 @compiled()
 def silhouettes(boxes: Floats) -> tuple[Floats, Floats, Mask]:
-    """What of boxes (n, 7) bounds their hulls, seen from the origin, and which of them surround it.
+    """The bounds of the hulls of boxes (n, 7), seen from the origin, and which boxes surround it.
 
     Returns x and y (n, 5, 2) of the centre and the four corners. Then (n, 2, 2) the heights of
     bottom and top, each with the distance in the x, y plane at which it appears lowest or highest.
@@ -148,10 +148,10 @@ def silhouettes(boxes: Floats) -> tuple[Floats, Floats, Mask]:
 
 
 class GridSpacing(NamedTuple):
-    """What of a grid tells the cell of a direction: its numbers of `columns` and `rows`, the
-    `column_width` and `row_height` in radians, the elevation `top` of row 0, the azimuth `right` at
-    which column 0 begins, how many columns a whole `turn` would have, and the `elevations` (rows,)
-    of rows that are not equally spaced, else (0,).
+    """The numbers of a grid that give the cell of a direction: its numbers of `columns` and `rows`,
+    the `column_width` and `row_height` in radians, the elevation `top` of row 0, the azimuth
+    `right` at which column 0 begins, how many columns a whole `turn` would have, and the
+    `elevations` (rows,) of rows that are not equally spaced, else (0,).
     """
 
     columns: int
@@ -270,7 +270,7 @@ def _lay(cells: Integers, place: int, edges: Integers, grid: GridSpacing) -> int
     first, stop, upper, lower = edges
     columns = grid.columns
     for row in range(upper, lower):
-        # What reaches beyond a turn goes on at column 0.
+        # Columns beyond a turn continue at column 0.
         for column in range(min(stop - grid.turn, columns)):
             cells[place] = row * columns + column
             place += 1

@@ -40,8 +40,8 @@ and another number, 5.5 at random.
 
 _CELL_BITS = (MOST_COLUMNS * MOST_ROWS - 1).bit_length()
 _CELL_MASK = 2**_CELL_BITS - 1
-"""Of the number by which a cell is sorted, the low bits are the cell and the others its key. So one
-number is moved where there were two, and equal keys come by cell."""
+"""The number by which a cell is sorted holds the cell in its low bits and the key in the others. So
+one number is moved instead of two, and equal keys are sorted by cell."""
 _SPARE = 4
 """So many cells more than are wanted are looked for: a share of a low-discrepancy sequence is off
 by a few."""
@@ -100,8 +100,8 @@ def sort_sets(
     """The first `most` cells of each of n sets in their order, and their sizes, as in
     `care_sim.core.cells.sets.CellSets`.
 
-    `cells` are given set after set, and of a set one LiDAR after the other, so many as `sizes`
-    (n, heads) tells. `heads` (heads, 3) are the first and the last row of each, and how many of its
+    `cells` are given set after set, and within a set LiDAR after LiDAR; `sizes` (n, heads) are
+    their numbers. `heads` (heads, 3) are the first and the last row of each, and how many of its
     columns a whole turn would have; `columns` are those of all.
     """
     rows = heads[-1, 1] + 1
@@ -191,8 +191,8 @@ def _short(number: float) -> int:
 
 @compiled(inline="always")
 def _row_and_column(cell: int, columns: int) -> tuple[int, int]:
-    """Of a cell. A multiplication is faster than a division of whole numbers; half a cell more
-    keeps its last bit from mattering.
+    """Return the row and column of a cell. A multiplication is faster than a division of whole
+    numbers; half a cell more keeps its last bit from mattering.
     """
     row = _short((_short(cell) + 0.5) * (1.0 / columns))
     return row, _short(cell - row * columns)
@@ -231,9 +231,9 @@ def _core(arc: _Arc, rays: _HeadRows, margins: SetMargins) -> tuple[int, int, in
     # All round there is no margin. Else the middle column stays, or the two middle ones.
     side = 0 if arc.width >= rays.columns else min(margins.columns, (arc.width - 1) // 2)
 
-    # What the margin would have beyond the grid was cut, and what is left of it is unknown: the
-    # outermost row counts as core, and so does the outermost column where the grid does not go all
-    # round. The middle stays here, too.
+    # The margin beyond the grid was cut, and the rest of it is unknown: the outermost row counts as
+    # core, and so does the outermost column where the grid does not go all round. The middle stays
+    # here, too.
     has_ends = rays.turn > rays.columns
     right = 0 if has_ends and arc.first == 0 else side
     left = 0 if has_ends and arc.first + arc.width == rays.columns else side
@@ -273,8 +273,8 @@ def _keep_lowest(
 @compiled()
 def _sort(count: int, bound: int, room: _Room) -> None:
     """Sort the first `count` numbers, whose keys lie below `bound`."""
-    # As many buckets as cells. Keys of a low-discrepancy sequence fill them evenly, so this takes
-    # a time in proportion to the cells; `places[b]` counts, then tells where bucket b begins.
+    # As many buckets as cells. Keys of a low-discrepancy sequence fill them evenly, so this takes a
+    # time in proportion to the cells; `places[b]` counts, then holds where bucket b begins.
     room.places[: count + 1] = 0
     share = count / bound
     for number in room.numbers[:count]:

@@ -2,7 +2,7 @@
 
 Frame: sensor frame, x forward, y left, z up; metres and radians. It stays level: a LiDAR that is
 tilted to the car turns the axes of its grid, about which the azimuths of columns and the elevations
-of rows are told.
+of rows are measured.
 """
 
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ MOST_TILT = np.pi / 4
 MOST_COLUMNS, MOST_ROWS = 2**14, 2**10
 """Bounds of a grid: a thousand times the cells of the paper's."""
 _LAST_BITS = 1e-6
-"""What rounding may add to the columns of a turn."""
+"""The most that rounding may add to the columns of a turn."""
 
 
 @dataclass(frozen=True)
@@ -222,6 +222,6 @@ class GridRays:
         directions = np.stack([forward, left, level], axis=-1).reshape(-1, 3)
         if self.is_tilted:
             directions = directions @ self.tilt.as_matrix().T
-        # Whoever asks shares the table, and a write to it would change the grid for all.
+        # All callers share the table, and a write to it would change the grid for all.
         directions.flags.writeable = False
         return directions

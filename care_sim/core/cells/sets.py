@@ -20,8 +20,8 @@ class CellSets(Sequence[Integers]):
     """Sets of cells, each in its own order: `cells` (n,) of one after the other, and the `sizes`
     (m,) of the sets.
 
-    Whoever reads it finds a sequence of arrays. Compiled code takes it as two arrays, where a list
-    of arrays would be converted one by one at every call.
+    It reads as a sequence of arrays. Compiled code takes it as two arrays, where a list of arrays
+    would be converted one by one at every call.
     """
 
     def __init__(self, cells: Integers, sizes: Integers):
@@ -66,7 +66,7 @@ class CellSets(Sequence[Integers]):
         return CellSets(_gathered(self.cells, starts[rows], sizes), sizes)
 
     def part(self, first: int, last: int) -> "CellSets":
-        """Of every set its cells from place `first` up to, not including, `last`."""
+        """Return the cells of every set from place `first` up to, not including, `last`."""
         return CellSets(*_parts(self.cells, self.sizes, first, last))
 
     @cached_property
@@ -124,7 +124,7 @@ class WorldSets(NamedTuple):
         return WorldSets(self.sets.take(kept), kept_of_each(kept, self.counts))
 
     def part(self, first: int, last: int) -> "WorldSets":
-        """Of every set its cells from place `first` up to, not including, `last`."""
+        """Return the cells of every set from place `first` up to, not including, `last`."""
         return WorldSets(self.sets.part(first, last), self.counts)
 
 

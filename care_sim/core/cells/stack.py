@@ -29,9 +29,9 @@ class GridStack(HeadCells):
     """The `grids` of several LiDARs, and the `places` (x, y, z) where they stand in the sensor
     frame, in metres: the first at its origin.
 
-    It has what whoever fires cells needs of an `AngularGrid`. What belongs to the rows and columns
-    of one LiDAR is asked of its `heads`, which a plain grid has, too. Raises InvalidInput for grids
-    of different numbers of columns, more than 1,024 rows in all, and places that are none.
+    It has all of an `AngularGrid` that firing cells needs. Its `heads`, which a plain grid has too,
+    hold the rows and columns of one LiDAR each. Raises InvalidInput for grids of different numbers
+    of columns, more than 1,024 rows in all, and places that are none.
     """
 
     grids: tuple[AngularGrid, ...]

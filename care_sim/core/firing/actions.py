@@ -26,7 +26,7 @@ NOT_FIRED, EXPLOITATION, RESERVE, FLOOR, CHOSEN, ALONG = range(len(SHARES))
 def scores_of(cells: Cells, shape: tuple[int, int], shots: Integers | int = 1) -> Action:
     """The action (E, A) that demands `cells` (n,); the earlier, the higher. Hardware that may fire
     cells more than once (`care_sim.core.firing.base`) fires each `shots` (n,) times at least, as
-    far as their sum does not exceed the budget; what is left of that goes on top.
+    far as their sum does not exceed the budget; the rest is added on top.
 
     An action is float32. It keeps the order of 2^23 cells of one shot, and of 2^23 / (m (m + 1)) of
     up to m shots; among more, neighbours may tie.
@@ -45,9 +45,9 @@ def shares_of(fired: Cells, action: Action, demand: Demand | None, rig: Rig) -> 
     """(E, A) the share of the budget that each of the `fired` cells came from, an index into
     `SHARES`.
 
-    `demand` is what the policy asked for. If it is None, or not the one behind the `action`, what
+    `demand` is the demand of the policy. If it is None, or not the one behind the `action`, what
     the action scored is "chosen", since more is not known. A cell that fires along with others of
-    its unit has the share of the first of them that was asked for.
+    its unit has the share of the first of them that was demanded.
     """
     asked = np.flatnonzero(np.asarray(action).ravel() > 0)
     kinds = np.full(len(asked), CHOSEN)
@@ -56,13 +56,13 @@ def shares_of(fired: Cells, action: Action, demand: Demand | None, rig: Rig) -> 
     if demand is not None:
         taken = allocate(demand, rig.budget, rig.reserve_fraction)
         if np.array_equal(np.sort(taken), asked):
-            # Exploitation fills first, whatever the layers ask for: without them, the allocator
+            # Exploitation fills first, whatever the layers demand: without them, the allocator
             # takes its cells and no others.
             first = allocate(Demand(demand.exploitation), rig.budget, rig.reserve_fraction)
             asked = taken
             kinds = np.where(np.arange(len(taken)) < len(first), EXPLOITATION, RESERVE)
 
-    # What fired and was not asked for came from the floor; of hardware that spends none it fired
+    # Cells that fired without a demand came from the floor, or, on hardware without a floor, fired
     # along with the rest of a window.
     unasked = FLOOR if rig.hardware.spends_floor else ALONG
     shares = np.full(rig.grid.size, NOT_FIRED, np.uint8)

@@ -159,17 +159,38 @@ def fired_cells(scores: NDArray[np.floating] | Mask, budget: int, floor: Floor |
     there are fewer, the `floor` tops them up; None leaves the rest unspent.
     """
     flat = scores.ravel().astype(np.float32, copy=False)
-    chosen = np.empty(len(flat), np.bool_)
-    count = choose_demanded(flat, budget, chosen)
-    if floor is not None:
-        count = top_up(chosen, count, floor, budget)
-    cells = np.empty(count + 1, np.int64)
-    list_chosen(chosen, cells)
-    return cells[:count]
+    chosen, cells = np.empty(len(flat), np.bool_), np.empty(len(flat) + 1, np.int64)
+    units = np.arange(len(flat))
+    has_floor = floor is not None
+    count = fire_free(flat, budget, has_floor, floor or _NO_FLOOR, units, chosen, cells)
+    return cells[:count].copy()
+
+
+_NO_FLOOR = Floor(0, 0, 0)
 
 
 @compiled()
-def choose_demanded(scores: NDArray[np.float32], budget: int, chosen: Mask) -> int:
+def fire_free(
+    scores: NDArray[np.float32],
+    budget: int,
+    has_floor: bool,
+    floor: Floor,
+    units: Integers,
+    chosen: Mask,
+    cells: Cells,
+) -> int:
+    """Fill `cells` as `fired_cells` by `scores` (N,), and return how many there are. `cells` has
+    room for one more, `units` (N,) are the cells themselves, and `chosen` (N,) is overwritten.
+    """
+    count = _choose_demanded(scores, budget, chosen)
+    if has_floor:
+        count = top_up(floor, units, chosen, count, budget)
+    _list_chosen(chosen, cells)
+    return count
+
+
+@compiled()
+def _choose_demanded(scores: NDArray[np.float32], budget: int, chosen: Mask) -> int:
     """Set in `chosen` (N,) whether a cell is one of the `budget` with the highest strictly positive
     `scores` (N,), of equals the lower one. Returns how many are.
     """
@@ -193,24 +214,33 @@ def choose_demanded(scores: NDArray[np.float32], budget: int, chosen: Mask) -> i
 
 
 @compiled()
-def top_up(chosen: Mask, count: int, floor: Floor, budget: int) -> int:
-    """Choose the first free cells of the `floor` besides, up to the budget; `count` are chosen
-    before. Returns how many are afterwards.
+def take_units(order: Cells, unit_of: Integers, taken: Mask, count: int, most: int) -> int:
+    """Mark the units of the cells `order` as taken, in its order, until `most` of them are;
+    `count` are before. Returns how many are afterwards.
     """
+    for cell in order:
+        if count >= most:
+            break
+        unit = unit_of[cell]
+        count += not taken[unit]
+        taken[unit] = True
+    return count
+
+
+@compiled()
+def top_up(floor: Floor, unit_of: Integers, taken: Mask, count: int, most: int) -> int:
+    """As `take_units`, in the order of the `floor`."""
     batch = 0
-    budget = min(budget, len(chosen))
-    while count < budget:
-        for cell in draw_cells(floor, batch, len(chosen)):
-            if count >= budget:
-                break
-            count += not chosen[cell]
-            chosen[cell] = True
+    most = min(most, len(taken))
+    while count < most:
+        cells = draw_cells(floor, batch, len(unit_of))
+        count = take_units(cells, unit_of, taken, count, most)
         batch += 1
     return count
 
 
 @compiled()
-def list_chosen(chosen: Mask, cells: Cells) -> None:
+def _list_chosen(chosen: Mask, cells: Cells) -> None:
     """Fill `cells` with those that are `chosen`, ascending; it is longer than their number."""
     # Every cell is written, and the next one over it if it is not chosen: no branch could foretell
     # the cells of a random floor.
@@ -263,8 +293,8 @@ class Energy(FreeCells):
     The scores say how the energy is to be shared. Shots are dealt one by one, each to the cell
     whose score is the highest per shot that it would then have (as seats are dealt to parties by
     D'Hondt). So equal scores have equally many shots, all cells their first one before any its
-    second, and scores of 3 to 1 ask for three shots to one. The floor spends what is left once
-    every demanded cell has `shots`. With one shot that is free cells.
+    second, and scores of 3 to 1 get three shots to one. The floor spends what is left once every
+    demanded cell has `shots`. With one shot that is free cells.
 
     No product is known that aims every shot and counts photons over several.
     """
@@ -300,6 +330,6 @@ class Energy(FreeCells):
         if floor is not None:
             asked = flat > 0
             chosen = asked.copy()
-            top_up(chosen, len(fired), floor, budget)
+            top_up(floor, self.unit_of, chosen, len(fired), budget)
             fired = np.concatenate([fired, np.flatnonzero(chosen & ~asked)])
         return np.sort(fired)

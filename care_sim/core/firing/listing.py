@@ -72,7 +72,7 @@ def _parsed(firing: str) -> tuple[type[Hardware], tuple[float, ...]]:
     if kind is None or len(given) != len(kind.numbers) or not all(map(_NUMBER.fullmatch, given)):
         raise _unknown(firing)
     try:
-        # Of the type of the usual ones: what is counted is a whole number.
+        # They get the type of the usual numbers: counts are whole numbers.
         return kind, tuple(type(n)(text) for n, text in zip(kind.usual, given, strict=True))
     except ValueError as error:
         raise _unknown(firing) from error

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from care_sim.base.checks import check_number
 from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.cells.stack import Grid
-from care_sim.core.firing.base import Hardware, demanded, ranked
-from care_sim.core.firing.floor import Floor, draw_cells
+from care_sim.core.firing.base import Hardware, demanded, ranked, take_units, top_up
+from care_sim.core.firing.floor import Floor
 from care_sim.core.grid import Cells
 
 
@@ -57,9 +57,9 @@ class Blocks(Hardware):
         """The blocks of the demanded cells in their order, then those of the floor."""
         taken = np.zeros(self.units, np.bool_)
         most = min(budget // self.unit_cells, self.units)
-        count = _take(demanded(scores), self.unit_of, taken, 0, most)
+        count = take_units(demanded(scores), self.unit_of, taken, 0, most)
         if floor is not None:
-            _take_floor(floor, self.unit_of, taken, count, most)
+            top_up(floor, self.unit_of, taken, count, most)
         return np.flatnonzero(taken[self.unit_of])
 
     def best(self, worth: Floats, budget: int, last: Cells) -> Integers:
@@ -71,29 +71,6 @@ def _nearest_divisor(size: int, whole: int) -> int:
     """The divisor of `whole` that is nearest to `size`, of two the smaller."""
     divisors = [n for n in range(1, whole + 1) if whole % n == 0]
     return min(divisors, key=lambda n: abs(n - size))
-
-
-@compiled()
-def _take(order: Cells, unit_of: Integers, taken: Mask, count: int, most: int) -> int:
-    """Mark the units of the cells `order` as taken, in its order, until `most` of them are;
-    `count` are before. Returns how many are afterwards.
-    """
-    for cell in order:
-        if count == most:
-            break
-        unit = unit_of[cell]
-        count += not taken[unit]
-        taken[unit] = True
-    return count
-
-
-@compiled()
-def _take_floor(floor: Floor, unit_of: Integers, taken: Mask, count: int, most: int) -> None:
-    """As `_take`, of the cells of a floor."""
-    batch = 0
-    while count < most:
-        count = _take(draw_cells(floor, batch, len(unit_of)), unit_of, taken, count, most)
-        batch += 1
 
 
 class Tiles(Blocks):
@@ -111,8 +88,8 @@ class Tiles(Blocks):
 
 
 class RingSegments(Blocks):
-    """A spinning sensor that is told for every channel in which sections of azimuth it fires. The
-    sensor of the source knows five sections per channel, which is not held to here.
+    """A spinning sensor that fires in chosen sections of azimuth, chosen per channel. The sensor of
+    the source has five sections per channel; this one has no such limit.
     """
 
     name = "segments"
@@ -145,9 +122,9 @@ class WholeRows(Blocks):
 
 
 class WholeColumns(Blocks):
-    """A line laser whose upright plane a galvanometer mirror turns. How fast the mirror turns is
-    not held to here; `azimuth-window` is hardware that turns slowly. Of several LiDARs each has its
-    own. Raises InvalidInput where their columns have different numbers of cells.
+    """A line laser whose upright plane a galvanometer mirror turns. The speed of the mirror is not
+    limited; `azimuth-window` is hardware that turns slowly. Each of several LiDARs has its own
+    plane. Raises InvalidInput where their columns have different numbers of cells.
     """
 
     name = "columns"
@@ -169,16 +146,15 @@ class Window(Hardware):
 
     A demand is projected in its own order: cell by cell, the window is held to places that hold the
     cell as well as those before it. A cell that no such place holds is passed over, as is one out
-    of reach. Of the places that are left the window takes the one nearest to where it stood, so it
-    stays where nothing is demanded. It always fires as a whole: nothing is left for the floor.
-    Raises InvalidInput for several LiDARs.
+    of reach. The window takes the nearest of the places that are left, so it stays if nothing is
+    demanded. It always fires as a whole: nothing is left for the floor. Raises InvalidInput for
+    several LiDARs.
     """
 
     spends_floor = False
 
     def __init__(self, grid: Grid, unit_cells: int):
-        # What one window serves cannot be weighed against another's: which LiDAR gets how much of
-        # the budget is no question that hardware answers.
+        # Hardware does not share a budget among the windows of several LiDARs.
         if len(grid.heads) > 1:
             raise InvalidInput(
                 f"firing {self.name} is the window of one LiDAR, and the set-up has "
@@ -289,7 +265,7 @@ class VerticalWindow(Window):
 
 
 _LAST_BITS = 1e-9
-"""What rounding may take from a number of columns."""
+"""The most that rounding may take from a number of columns."""
 
 
 class AzimuthWindow(Window):
@@ -297,9 +273,9 @@ class AzimuthWindow(Window):
     `degrees` from keyframe to keyframe, and stands straight ahead before the first one.
 
     The sensor of the source restarts for another window, so that it has 0 degrees during a drive,
-    and its lasers go on firing outside: it saves data, not shots. The usual 10 stand for a head
-    that turns by 100 degrees a second; no product is known to. Raises InvalidInput for degrees
-    outside 0 to 180, and for a grid that does not go all round.
+    and its lasers keep firing outside: it saves data, not shots. The usual 10 stand for a head that
+    turns by 100 degrees a second; no product is known to. Raises InvalidInput for degrees outside 0
+    to 180, and for a grid that does not go all round.
     """
 
     name = "azimuth-window"

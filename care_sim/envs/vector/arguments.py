@@ -1,6 +1,4 @@
-"""What goes into a vector environment and what comes out of it beside arrays: arguments, of which
-every world may have some of its own, seeds and infos.
-"""
+"""Arguments, seeds and infos of a vector environment. Some arguments may differ per world."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
@@ -23,9 +21,8 @@ Maker = partial[ClosedLoopEnv]
 
 
 def makers_of(kind: type[ClosedLoopEnv], arguments: Mapping[str, Any], worlds: int) -> list[Maker]:
-    """What makes the single environment of each of so many worlds, from the `arguments` of their
-    vector environment. Raises InvalidInput for a list of another length, and for one of what all
-    worlds share.
+    """Return a maker of each world's single environment, from the `arguments` of their vector.
+    Raises InvalidInput for a list of another length, and for one of what all worlds share.
     """
     for name, default in DEFAULTS.items():
         lists_itself = name in OF_EACH_WORLD or isinstance(default, tuple)
@@ -138,8 +135,8 @@ def joined(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 def kept(columns: dict[str, Any], who: Mask) -> dict[str, Any]:
     """Infos in the form of Gymnasium: of `columns` (W, ...), or dictionaries of them, the rows of
-    the worlds `who` (W,), 0 or None of the others; and beside every name, with a line before it, of
-    whom it tells.
+    the worlds `who` (W,), 0 or None of the others; and beside every name a mask of these worlds,
+    under the name with a leading underscore.
     """
     infos = dict[str, Any]()
     for name, column in columns.items():

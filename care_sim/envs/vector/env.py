@@ -23,7 +23,7 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import Action
 from care_sim.envs import scenarios
 from care_sim.envs.closed_loop import ClosedLoopEnv
-from care_sim.envs.sensing import Observed, checked_scores
+from care_sim.envs.sensing import Observed, checked_scores, entropy_of
 from care_sim.envs.vector.arguments import (
     autoreset_of,
     joined,
@@ -35,6 +35,7 @@ from care_sim.envs.vector.arguments import (
     worlds_to_reset,
 )
 from care_sim.envs.worlds import Stepped, Worlds
+from care_sim.loops.stages.choice import Choice
 from care_sim.scenarios.base import Scenario
 
 _T = TypeVar("_T")
@@ -50,7 +51,7 @@ class Threads:
         self._others: list[Future[Any]] = []
 
     def all(self, tasks: Sequence[Callable[[], _T]]) -> list[_T]:
-        """What every task gives. The first of them is done by the thread that asks."""
+        """Run all tasks and return their results. The calling thread runs the first task."""
         if len(tasks) < 2:
             return [task() for task in tasks]
         # A fork copies no threads: in a new process they begin anew.
@@ -59,10 +60,10 @@ class Threads:
             self._process = os.getpid()
             self._others = []
             finalize(self, self._pool.shutdown, wait=False)
-        # Whoever was interrupted while waiting has left some at work.
+        # An interrupt while waiting has left some tasks at work.
         wait(self._others)
         self._others = others = [self._pool.submit(task) for task in tasks[1:]]
-        # All are waited for, whatever one of them raises: nothing goes on behind the caller's back.
+        # All are waited for, whatever one of them raises: no task outlives the call.
         try:
             first = tasks[0]()
         finally:
@@ -102,7 +103,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
 
     Observations, rewards and infos are those that `gymnasium.vector.SyncVectorEnv` gives, in all
     three of its modes of `autoreset_mode`: "NextStep", "SameStep" and "Disabled". With `copy=False`
-    the observations that are handed out are written over by the next step.
+    the next step overwrites the returned observations.
     """
 
     single: ClassVar[type[ClosedLoopEnv]]
@@ -148,6 +149,8 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         ends = [num_envs * k // count for k in range(count + 1)]
         self._shares = [slice(*ends[k : k + 2]) for k in range(count)]
         self._worlds = [self._made(share) for share in self._shares]
+        # Each draws the seeds of its later episodes as the single environment does.
+        self._seeded = [gymnasium.Env[Any, Any]() for _ in range(num_envs)]
         self._threads = Threads(count)
         self._steps = np.zeros(num_envs, np.int64)
         self._over = np.zeros(num_envs, np.bool_)
@@ -155,7 +158,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
 
     @property
     def rig(self) -> Rig:
-        """What is fixed about the sensing task. Raises InvalidInput where budgets differ."""
+        """The fixed settings of the sensing task. Raises InvalidInput where budgets differ."""
         rig: Rig = shared_attribute(self, "rig")
         return rig
 
@@ -239,8 +242,8 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         stepped.truncated[:] |= ~begins & (self._steps >= self._most_steps)
         over = stepped.terminated | stepped.truncated
 
-        # What is over begins anew, now or at the next step. In the mode "SameStep" its last
-        # observation and info are told apart from the first ones of the new episode.
+        # Episodes that are over begin anew, now or at the next step. The mode "SameStep" returns
+        # their last observation and info beside the first ones of the new episode.
         anybody = [None] * self.num_envs
         if self.autoreset_mode == AutoresetMode.SAME_STEP and over.any():
             final = {
@@ -267,7 +270,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
         self._threads = Threads(len(self._shares))
-        # In a copy, too, the worlds write into rows of the observations that are handed out.
+        # The worlds of a copy, too, write into rows of its returned observations.
         for worlds, share in zip(self._worlds, self._shares, strict=True):
             worlds.observed.update(_rows(self._observed, share))
 
@@ -278,8 +281,10 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
     def _made(self, share: slice) -> Worlds:
         rows = _rows(self._observed, share)
         settings = [model.setting for model in self._models[share]]
-        # Where no info tells of clearances, few of them are needed.
-        return Worlds(settings, rows, self._model.scoring_info, self._one_budget)
+        budgets = np.array([one.rig.budget for one in settings])
+        choice = Choice(self._model.rig, self._model.conditions, budgets)
+        # Infos without clearances need few of them.
+        return Worlds(settings, choice, rows, self._model.scoring_info, self._one_budget)
 
     def _played(self, scores: NDArray[np.float32], who: Mask) -> Stepped:
         # An error leaves worlds at different keyframes: then all have to begin anew.
@@ -313,7 +318,8 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         self._begun[who] = False
         # One share after the other: this is Python nearly alone, and threads would take turns.
         for worlds, share in zip(self._worlds, self._shares, strict=True):
-            own = {world: seeds[share.start + world] for world in _places(who[share])}
+            numbers = {world: share.start + world for world in _places(who[share])}
+            own = {world: entropy_of(self._seeded[n], seeds[n]) for world, n in numbers.items()}
             for world, info in (worlds.begin(own) if own else {}).items():
                 infos = self._add_info(infos, info, share.start + world)
         self._over[who] = False
@@ -322,7 +328,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         return infos
 
     def _infos(self, stepped: Stepped, who: Mask) -> dict[str, Any]:
-        """What a step tells of the worlds `who` (W,)."""
+        """Return the infos of a step of the worlds `who` (W,)."""
         infos = kept(stepped.columns, who) if who.any() else {}
         for world, info in stepped.single.items():
             if who[world]:

@@ -57,7 +57,7 @@ class ExportScans(Watching):
       `bodies` (`name`, `class` or null, `box`), all in the world frame (x along the road, y left,
       z up; in the open loop as its source has it) and truth;
       `tracks` (`id`, `class`, `box` of the forecast, `velocity` over ground) in the sensor frame;
-      `fired` cells, each as often as it was. Of the closed loop `detected` (the first-sighting
+      `fired` cells, each as often as it was. In the closed loop `detected` (the first-sighting
       actor), `braking`, `speed_mps`. In the open loop bodies are the annotated objects, each with
       `found` by this keyframe, `scored` (within range) and `appearing` (its first sighting).
     - `episode.json`: `units`, `grid`, `classes`, `shares`, and `outcome`, null until the end.
@@ -132,14 +132,14 @@ class ExportScans(Watching):
         cloud.point["share"] = tensor(shares.astype(np.uint8)[:, None])
         with replacing(file) as unfinished:
             written = self._open3d.t.io.write_point_cloud(str(unfinished), cloud)
-            # Open3D does not tell of a disk that is full.
+            # Open3D does not report a full disk.
             if not written or unfinished.stat().st_size < len(points) * POINT_BYTES:
                 reason = why_unwritable(unfinished) or "the point cloud could not be written"
                 raise OSError(errno.EIO, reason, str(file))
 
 
 def described(watched: Watched) -> dict[str, Any]:
-    """What stood around a scan, as plain data; see `ExportScans`."""
+    """Return the surroundings of a scan as plain data; see `ExportScans`."""
     situation, record = watched.situation, watched.record
     sensor = situation.sensor
     told = {

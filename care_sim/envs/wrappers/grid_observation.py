@@ -114,12 +114,12 @@ class GridObservation(
 
 
 def grid_shape(features: GridFeatures, pictures: bool) -> tuple[int, ...]:
-    """Of the pictures of a world: three dimensions, or all in one."""
+    """The pictures of a world: three dimensions, or all in one."""
     return features.shape if pictures else (int(np.prod(features.shape)),)
 
 
 def shaped(told: GridArrays, shape: tuple[int, ...]) -> GridArrays:
-    """What is told of W worlds, with pictures (W, *shape)."""
+    """Observations of W worlds, with pictures (W, *shape)."""
     return told | {"grid": told["grid"].reshape(-1, *shape)}
 
 
@@ -179,7 +179,7 @@ class VectorGridObservation(WorldsWrapper, ReadsBeliefs):
         return self._shown(observation), infos
 
     def step(self, actions: Any) -> tuple[GridArrays, Floats, Mask, Mask, dict[str, Any]]:
-        """Go on to the next keyframe."""
+        """Advance to the next keyframe."""
         observation, rewards, terminated, truncated, infos = self.env.step(actions)
         if "final_obs" in infos:
             infos = infos | {"final_obs": self._finals(infos["final_obs"])}

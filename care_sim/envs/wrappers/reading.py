@@ -1,6 +1,4 @@
-"""What wrappers ask of what they wrap, and what they believe: the observation that they were given,
-read once for all who need it.
-"""
+"""The settings of a wrapped environment, and its observation, read once for all wrappers."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -24,7 +22,7 @@ class WorldsWrapper(VectorWrapper[Any, Any, Any, Any, Any]):
 
     @property
     def autoreset_mode(self) -> AutoresetMode:
-        """Where Gymnasium's own vector environments tell it, too; TorchRL asks for it there."""
+        """As in Gymnasium's own vector environments; TorchRL reads it there."""
         mode: AutoresetMode = self.metadata["autoreset_mode"]
         return mode
 
@@ -82,7 +80,7 @@ class Reading:
 
     @property
     def beliefs(self) -> Beliefs:
-        """What was read last. Raises gymnasium.error.ResetNeeded before the first reset."""
+        """The last result. Raises gymnasium.error.ResetNeeded before the first reset."""
         if self._beliefs is None:
             raise gymnasium.error.ResetNeeded("call reset() before stepping")
         return self._beliefs
@@ -100,12 +98,12 @@ def read_one(observation: Observation, rig: Rig) -> Beliefs:
 
 
 def reading_of(env: Any) -> Reading | None:
-    """That of a wrapper, None of anything else."""
+    """Return the reading of a wrapper, None for anything else."""
     return env.reading if isinstance(env, ReadsBeliefs) else None
 
 
 def reading_inside(env: Any, what: str) -> Reading:
-    """That of the outermost wrapper of an environment, or of a vector, that reads. Raises
+    """Return the reading of the outermost reading wrapper of an environment or a vector. Raises
     InvalidInput, which says `what` needs it, if there is none.
     """
     layer = env

@@ -1,4 +1,4 @@
-"""The wrapper that records episodes for the Rerun viewer, whoever acts in them."""
+"""Record episodes of any agent for the Rerun viewer."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -25,8 +25,8 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
     """Records the keyframes of the loop under it.
 
     It may stand around or inside wrappers that change the action. With the `policy` that acts, the
-    shares of exploitation and reserve are known. Of raw actions it is only known what was chosen
-    and what the floor filled up.
+    shares of exploitation and reserve are known. Raw actions show only the chosen cells and those
+    of the floor.
 
     Raises InvalidInput for an environment that is no loop of CARE-Sim.
     """
@@ -84,7 +84,7 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
             self.begin(loop, self._episodes)
             self._begun = True
             self._episodes += 1
-        # Where everything stands is asked before the step, which moves the world on.
+        # The situation is read before the step, which moves the world.
         situation = self._watcher.situation()
         self.look(loop)
         observation, reward, terminated, truncated, info = super().step(action)
@@ -157,7 +157,7 @@ class RecordRerun(Watching):
     stay as they are.
 
     ### Arguments
-    `path` of the file; `policy`, the `care_sim.Policy` that acts, if one does. Its demands tell
+    `path` of the file; `policy`, the `care_sim.Policy` that acts, if one does. Its demands show
     which cells were exploitation and which reserve; without it only "chosen" and "floor" are known.
     `name` of the episode in the recording, the policy's by default. Environments of a vector need
     one file each, such as `f"out-{number}.rrd"`.

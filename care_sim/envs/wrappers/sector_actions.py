@@ -68,8 +68,8 @@ class SectorReserve(_Sectors, ReadsBeliefs):
     cells, 11.25 by 10.7 degrees; of the reserve of 3%, 148 cells, it takes 128.
 
     Raises `care_sim.InvalidInput` for other numbers, for an action of another shape or with values
-    that are not finite, for an environment that is none of CARE-Sim or whose observation no longer
-    tells the forecasts.
+    that are not finite, for an environment that is none of CARE-Sim or whose observation lacks the
+    forecasts.
 
     ### Example
     ```python
@@ -97,7 +97,7 @@ class SectorReserve(_Sectors, ReadsBeliefs):
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
-        """Fire what `action` makes of the scores and go on to the next keyframe."""
+        """Fire the scores that `action` makes and advance to the next keyframe."""
         answer = super().step(action)
         self.reading.take(answer[0])
         return answer
@@ -105,7 +105,7 @@ class SectorReserve(_Sectors, ReadsBeliefs):
     def action(self, action: NDArray[np.float32]) -> Action:
         """Scores (E, A) of the cells that the shared allocator takes."""
         scores = checked_scores(action, self.sectors.shape)
-        # A copy: whoever is given it may keep it.
+        # A copy: the caller may keep it.
         cells: Action = self._fired.reserve(self.reading.beliefs, scores[None])[0].copy()
         return cells
 
@@ -163,8 +163,8 @@ class _VectorSectors(WorldsWrapper):
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
     def step(self, actions: NDArray[np.float32]) -> tuple[Any, Floats, Mask, Mask, dict[str, Any]]:
-        """Fire what the scores `actions` (W, elevations, azimuths) make of the grid and go on to
-        the next keyframe.
+        """Fire the cells of the scores `actions` (W, elevations, azimuths) and advance to the next
+        keyframe.
         """
         scores = checked_scores(actions, (self.num_envs, *self.sectors.shape))
         return self.env.step(self._cells(scores))

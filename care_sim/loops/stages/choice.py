@@ -13,7 +13,7 @@ from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Integers, Mask
 from care_sim.core.conditions import Conditions
 from care_sim.core.defaults import CELLS
-from care_sim.core.firing.base import choose_demanded, list_chosen, top_up
+from care_sim.core.firing.base import fire_free
 from care_sim.core.firing.floor import Floor, floor_key
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
@@ -23,8 +23,8 @@ _NOTHING = np.empty(0, np.int64)
 
 
 class Choice:
-    """What the LiDARs of W worlds fire, each with its own of the `budgets` (W,), with the hardware
-    of a `rig` and the `conditions` of the floor.
+    """Chooses the cells that the LiDARs of W worlds fire, each within its own of the `budgets`
+    (W,). The hardware is that of the `rig`, the floor that of the `conditions`.
     """
 
     def __init__(self, rig: Rig, conditions: Conditions, budgets: Integers):
@@ -32,11 +32,11 @@ class Choice:
         self._budgets = budgets
         self._conditions = conditions
         self._rig = rig
-        self._size = rig.grid.size
         self._is_free = rig.firing == CELLS
         # The keys of the floors.
         self._keys = np.zeros((worlds, 2), np.int64)
-        # A row has room for one cell more, which `list_chosen` may write over and over.
+        self._cells = np.arange(rig.grid.size)
+        # `fire_free` needs room for one cell more.
         self._fired = Fired(np.zeros(worlds, np.int64), np.zeros((worlds, most + 1), int))
         # The last cells of hardware in units, world by world.
         self._last: list[Cells] = [_NOTHING] * worlds
@@ -47,28 +47,34 @@ class Choice:
         self._last[world] = _NOTHING
 
     def fired(self, scores: NDArray[np.float32], live: Mask, keyframes: Integers) -> Fired:
-        """The cells that fire by `scores` (W, E, A), finite numbers, in the worlds that are `live`
-        (W,), at their `keyframes` (W,); none in the others.
+        """Return the cells that fire by `scores` (W, E, A), finite numbers, in the worlds that are
+        `live` (W,), at their `keyframes` (W,); none in the others.
 
         The tables of free cells are the same at every call, and hold its cells till the next.
         """
         if not self._is_free:
             return Fired.of(self._in_units(scores, live, keyframes))
-        flat = scores.reshape(len(scores), self._size)
-        has_floor = self._conditions.floor
-        _fire(flat, live, keyframes, self._budgets, has_floor, self._keys, self._fired)
+        flat = scores.reshape(len(scores), -1)
+        floors = self._conditions.floor, self._keys
+        _fire(flat, live, keyframes, self._budgets, *floors, self._cells, self._fired)
         return self._fired
+
+    def would_fire(self, world: int, scores: NDArray[np.float32], keyframe: int) -> Cells:
+        """Return the cells that would fire in a world by `scores` (E, A) at a keyframe. Changes
+        nothing.
+        """
+        first, second = self._keys[world].tolist()
+        floor = Floor(first, second, keyframe) if self._conditions.floor else None
+        budget = int(self._budgets[world])
+        return self._rig.hardware.fire(scores, budget, floor, self._last[world])
 
     def _in_units(
         self, scores: NDArray[np.float32], live: Mask, keyframes: Integers
     ) -> Sequence[Cells]:
         rows = [_NOTHING] * len(live)
         for world in np.flatnonzero(live).tolist():
-            first, second = self._keys[world].tolist()
-            own = Floor(first, second, int(keyframes[world]))
-            floor = own if self._conditions.floor else None
-            given = scores[world], int(self._budgets[world]), floor, self._last[world]
-            rows[world] = self._last[world] = self._rig.hardware.fire(*given)
+            fired = self.would_fire(world, scores[world], int(keyframes[world]))
+            rows[world] = self._last[world] = fired
         return rows
 
 
@@ -80,16 +86,15 @@ def _fire(
     budgets: Integers,
     has_floor: bool,
     keys: Integers,
+    units: Cells,
     fired: Fired,
 ) -> None:
     """Fill `fired`; see `Choice.fired`."""
     chosen = np.empty(scores.shape[1], np.bool_)
     for world in range(len(scores)):
-        count, budget = 0, budgets[world]
+        count = 0
         if live[world]:
-            count = choose_demanded(scores[world], budget, chosen)
-            if has_floor:
-                floor = Floor(keys[world, 0], keys[world, 1], keyframes[world])
-                count = top_up(chosen, count, floor, budget)
-            list_chosen(chosen, fired.cells[world])
+            floor = Floor(keys[world, 0], keys[world, 1], keyframes[world])
+            given = scores[world], budgets[world], has_floor, floor, units
+            count = fire_free(*given, chosen, fired.cells[world])
         fired.counts[world] = count

@@ -1,4 +1,4 @@
-"""What the detectors of all worlds make of the returns.
+"""The detectors of all worlds.
 
 The paper's proxy (`care_sim.perception.proxy`) detects in compiled code, any other detector world
 by world.
@@ -16,7 +16,7 @@ from care_sim.core.types import Scan
 from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.gathering import Gathering, acted_on
 from care_sim.loops.stages.scanning import Returns
-from care_sim.loops.stages.state import Bodies, Reported, Sensors, State, seen_by
+from care_sim.loops.stages.state import Reported, State
 from care_sim.perception.matching import found_objects
 from care_sim.perception.points_only import Detector
 from care_sim.perception.proxy import count_hits
@@ -85,7 +85,7 @@ class Detecting:
                 self._found = found
             hits = state.live, returns.counts, returns.ids
             told = state.egos.targets, self.detected
-            _detect(*hits, state.reported, state.bodies, state.sensors, self._least, found, *told)
+            _detect(*hits, state.reported, self._least, found, *told)
             return found
         for world in np.flatnonzero(state.live).tolist():
             one = self._ones[world]
@@ -135,8 +135,9 @@ class _OneDetector:
         """Classes (n,), sensor-frame boxes (n, 7) and the body (n,) behind each detection or
         NO_OBJECT, of the returns of `bodies`; and (k,) all bodies that were found.
 
-        What is found is scored by the class-consistent 2 m match (paper, Remark 1), and only what a
-        box has returns of: else a box on the end of a lorry would find who is hidden behind it.
+        Found bodies are scored by the class-consistent 2 m match (paper, Remark 1), and only bodies
+        with returns in a box count: else a box on the end of a lorry would find a person hidden
+        behind it.
         """
         detector, sensor = self._detector, state.sensors.frame(world)
         objects = self._named[np.minimum(bodies, len(self._named) - 2)]
@@ -163,11 +164,9 @@ class _OneDetector:
 
 def _present(state: State, world: int) -> Annotations:
     """The reported bodies of a world."""
-    reported = state.reported
-    count = reported.counts[world]
-    bodies = reported.bodies[world, :count].copy()
-    boxes = seen_by(state.sensors, world, state.bodies.boxes[world, bodies])
-    return Annotations(bodies, reported.classes[world, :count].copy(), boxes)
+    counts, bodies, classes, boxes, _ = state.reported
+    own = world, slice(counts[world])
+    return Annotations(bodies[own].copy(), classes[own].copy(), boxes[own].copy())
 
 
 @compiled(brief=True)
@@ -176,8 +175,6 @@ def _detect(
     counts: Integers,
     ids: Integers,
     reported: Reported,
-    bodies: Bodies,
-    sensors: Sensors,
     least: int,
     found: Found,
     targets: Integers,
@@ -198,10 +195,6 @@ def _detect(
                 found.classes[w, count] = reported.classes[w, row]
                 found.objects[w, count] = known[row]
                 for k in range(7):
-                    found.boxes[w, count, k] = bodies.boxes[w, known[row], k]
+                    found.boxes[w, count, k] = reported.boxes[w, row, k]
                 count += 1
         found.counts[w] = count
-        seen = seen_by(sensors, w, found.boxes[w, :count])
-        for n in range(count):
-            for k in range(7):
-                found.boxes[w, n, k] = seen[n, k]

@@ -1,7 +1,7 @@
 """The drivers of all worlds.
 
-The fixed controller (`care_sim.driving.braking`) decides in compiled code. Another driver, and what
-goes on along a route, is done world by world.
+The fixed controller (`care_sim.driving.braking`) decides in compiled code. Other drivers, and
+driving along a route, run world by world.
 """
 
 from collections.abc import Collection, Mapping

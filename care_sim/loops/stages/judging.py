@@ -1,5 +1,5 @@
-"""What the scoring asks about one world at a time: needless and unfounded brakes, and whom a drive
-lets the ego meet. Truth.
+"""Judgements for the scoring, world by world: needless and unfounded brakes, and sights of the
+actors that the ego meets. Truth.
 """
 
 from collections.abc import Callable, Mapping
@@ -34,7 +34,7 @@ class Judging:
         """Begin an episode."""
         for judges in (self._needless, self._unfounded, self._meeting):
             judges.pop(world, None)
-        # The outcome of a drive alone tells of it, and it asks the truth about every body.
+        # Only the outcome of a drive holds it, and it reads the truth about every body.
         if built.speed_plan:
             self._needless[world] = NeedlessBraking(*self._strip, self._rules)
         # The proxy reports bodies alone. Another detector may make one up.
@@ -76,8 +76,8 @@ class Judging:
     def sights(
         self, state: State, shows: Callable[[int, int], bool], detecting: Detecting, found: Found
     ) -> dict[int, tuple[Sight, ...]]:
-        """Whom the scenarios let the egos meet, at this scan, in the live worlds that have some.
-        `shows` says of a world and a body whether a camera shows it.
+        """Return the sights of the actors that egos are to meet, at this scan, in live worlds with
+        some. `shows` says of a world and a body whether a camera shows it.
         """
         sights = {}
         for world in (n for n in self._meeting if state.live[n]):

@@ -14,8 +14,8 @@ from care_sim.loops.stages.state import Sensors, State
 
 
 class Locating:
-    """Places the sensors at every keyframe, and reads the odometry. `limits` (2, 3) are the least
-    and the most that an observation tells of speed, yaw rate and acceleration.
+    """Places the sensors at every keyframe, and reads the odometry. `limits` (2, 3) are the bounds
+    of speed, yaw rate and acceleration in an observation.
     """
 
     def __init__(self, rig: Rig, sensing: Sensing, limits: Floats, state: State):
@@ -42,7 +42,7 @@ class Locating:
             self._odometers[world] = Odometry(self._sensing.ego_speed_sigma, seeds.odometry)
 
     def look(self, state: State) -> None:
-        """Go on to the keyframe of the worlds that are live."""
+        """Locate the sensors of the live worlds at their coming keyframe."""
         placed = state.bodies.boxes, state.egos.bodies, state.live
         place_sensors(state.sensors, *placed, self._at)
         if state.driven is not state.taken:

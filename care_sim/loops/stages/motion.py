@@ -1,7 +1,7 @@
 """Worlds move on: what `World.step` does, with no Python per world in the common case.
 
-Common is a world whose ego and drivers keep their lanes and whose other bodies stand, or go where
-the time alone tells. Any other moves by its own Python.
+In a common world ego and drivers keep their lanes, and the other bodies stand or move by the clock
+alone. Any other world moves by its own Python.
 """
 
 from collections.abc import Callable, Sequence
@@ -185,7 +185,7 @@ class Motion:
         return over
 
     def _keepers(self, built: World, drivers: Sequence[Actor]) -> list[LaneKeeper] | None:
-        """What ego and drivers of a world go by, if they are to keep their lanes, else None."""
+        """Return the lane keepers of ego and drivers, None if they may leave their lanes."""
         kind = type(built)
         if any(getattr(kind, name) is not getattr(World, name) for name in _MAY_BE_REPLACED):
             return None
@@ -237,7 +237,7 @@ def _is_vehicle(source: object) -> TypeGuard[RoadVehicle]:
 
 
 def _timetable(actor: Actor) -> object:
-    """What tells where an actor is at a time, if the time alone tells it."""
+    """Return the timetable of an actor that moves by the clock alone, else None."""
     return getattr(_source(actor), "__self__", None)
 
 
@@ -274,9 +274,8 @@ def _go_on(
     boxes: Floats,
     before: Floats,
 ) -> None:
-    """Let the clocks of the worlds that are `live` go on by a world step: the `steps` (W,) that
-    each has done, and of the `times` of all steps that of each world `now` (W,). What was in
-    `boxes` is in `before`.
+    """Advance the clocks of the worlds that are `live` by a world step: their `steps` (W,) done,
+    and their times `now` (W,), from the `times` of all steps. Copies `boxes` to `before`.
     """
     for world in range(len(live)):
         if live[world]:
@@ -307,14 +306,14 @@ def _follow(
     """Put the bodies of the worlds that move `together` where they are after their `steps`.
 
     The vehicles in the lanes have `rows` as in `LaneColumns`, the ego first, and are the bodies
-    `drivers` (W, V); the egos' speeds (W,) were those `before` the world step. What goes by time
-    alone are the bodies `timed` (W, P), and their `ways` (W, P, steps + 1, 5) x, y, heading, and
-    sine and cosine of half of it.
+    `drivers` (W, V); the egos' speeds (W,) were those `before` the world step. The bodies `timed`
+    (W, P) move by the clock alone; their `ways` (W, P, steps + 1, 5) are x, y, heading, and sine
+    and cosine of half of it.
     """
     for world in range(len(together)):
         if not together[world]:
             continue
-        # Who keeps a lane along x changes nothing but x.
+        # A vehicle that keeps a lane along x changes nothing but x.
         for n in range(lane_counts[world]):
             body, x = drivers[world, n], rows[world, n, 0]
             boxes[world, body, 0] = x

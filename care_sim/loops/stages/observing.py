@@ -1,4 +1,4 @@
-"""What the policies of all worlds are told, within the limits of observations."""
+"""The observations of all worlds, within their limits."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from care_sim.core.types import Ego, ImageDetections, Tracks
 from care_sim.loops.observation_limits import Limits
 from care_sim.loops.stages.state import State
 
-# Which column of a table tells the camera, by which bounds differ.
+# The column of the camera, by which bounds differ.
 _CAMERA, _NO_CAMERA = ImageDetections.CAMERA, -1
 
 Observations = dict[str, NDArray[np.float32]]
@@ -31,8 +31,8 @@ def room_for_observations(rig: Rig, worlds: int) -> Observations:
 
 
 class Observing:
-    """Writes what the policies are told, within the limits of observations. Writes each of the
-    `budgets` (W,) as a share of all cells.
+    """Writes observations within their limits, and each of the `budgets` (W,) as a share of all
+    cells.
     """
 
     def __init__(self, limits: Limits, budgets: Integers):

@@ -32,7 +32,7 @@ ROAD = 0
 
 
 class Returns(NamedTuple):
-    """What the fired cells of a keyframe met: `counts` (W,) rows, of ascending `cells` (W, F); a
+    """Returns of the fired cells of a keyframe: `counts` (W,) rows, of ascending `cells` (W, F); a
     cell with several returns has a row for each. `ranges` (W, F) in metres, inf without a return;
     `ids` (W, F) of bodies, NO_BODY there.
     """
@@ -90,7 +90,7 @@ class Scanning:
             self._lidars[world] = lidar_of(built, self._rig, self._sensing, seed)
 
     def scan(self, state: State, fired: Fired) -> Returns:
-        """What the `fired` cells meet, the sensors where `state.sensors` has them."""
+        """Cast the `fired` cells of the live worlds, from `state.sensors`."""
         if not self.is_compiled:
             return self._one_by_one(state, fired)
         if self._returns.ranges.shape != fired.cells.shape:
@@ -170,11 +170,9 @@ def _scan(
         if live[w]:
             rays = fired.counts[w]
             count = solids.counts[w]
+            shapes, halves, offsets, owners = solids.parts
             parts = Parts(
-                solids.shapes[w, :count],
-                solids.halves[w, :count],
-                solids.offsets[w, :count],
-                solids.owners[w, :count],
+                shapes[w, :count], halves[w, :count], offsets[w, :count], owners[w, :count]
             )
             cast_into(
                 (ranges[w, :rays], ids[w, :rays]),

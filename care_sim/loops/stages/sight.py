@@ -1,4 +1,4 @@
-"""What the cameras of all worlds show, and the detections that arrive.
+"""The cameras of all worlds, and the detections that arrive.
 
 The pictures are those of the engine `fast` (`care_sim.sensors.engines.picture_kernels`), the
 detections those of an ideal camera (`care_sim.sensors.camera`): it may miss bodies, be late and
@@ -7,9 +7,10 @@ world.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers, Mask, longer
@@ -137,7 +138,9 @@ class Seeing:
         """Take the pictures of a keyframe: the newest detections that are due, and (W, B) which
         bodies a camera shows enough of for a box.
         """
-        boxes = self._boxes(state)
+        reported = state.reported
+        _see_boxes(state.live, state.sensors, state.bodies, reported)
+        boxes = reported.boxes
         seen = Detected.of(state.worlds, len(self._cameras.sizes) * boxes.shape[1])
         # The other worlds keep what was shown at their last keyframe.
         if self._shown.shape != state.bodies.boxes.shape[:2]:
@@ -151,8 +154,7 @@ class Seeing:
             state.sensors,
             state.bodies,
             state.outlines,
-            state.reported,
-            boxes,
+            reported,
             self._silent(state, boxes),
             seen,
             shown,
@@ -164,7 +166,7 @@ class Seeing:
         else:
             arrived = seen
         for world in np.flatnonzero(state.live & self.own).tolist():
-            at = state, world, boxes[world, : state.reported.counts[world]].copy()
+            at = state, world, boxes[world, : reported.counts[world]].copy()
             own = self.own_cameras[world].look(at, seen.take(world), shown[world])
             arrived = arrived.put(world, own)
         return arrived, shown
@@ -174,12 +176,6 @@ class Seeing:
         bodies = state.reported.bodies[world, : state.reported.counts[world]]
         boxes = seen_by(state.sensors, world, state.bodies.boxes[world, bodies])
         self.own_cameras[world].take((state, world, boxes))
-
-    def _boxes(self, state: State) -> Floats:
-        """(W, R, 7) of the reported bodies in the frames of the sensors."""
-        boxes = np.zeros((*state.reported.bodies.shape, 7))
-        _see_boxes(state.live, state.sensors, state.bodies, state.reported, boxes)
-        return boxes
 
     def _silent(self, state: State, boxes: Floats) -> Mask:
         """(W, R) the reported bodies that are missed, or are there when all is dark."""
@@ -266,24 +262,21 @@ def _copy_rows(rows: Floats, into: Floats) -> None:
 
 
 @compiled(brief=True)
-def _copy(numbers: Integers, into: Integers) -> None:
-    """As `_copy_rows`, of numbers (n,)."""
+def _copy(numbers: NDArray[Any], into: NDArray[Any]) -> None:
+    """Copy `numbers` (n,) to the first n of `into`, as `_copy_rows` does."""
     for n in range(len(numbers)):
         into[n] = numbers[n]
 
 
 @compiled(brief=True)
-def _see_boxes(
-    live: Mask, sensors: Sensors, bodies: Bodies, reported: Reported, boxes: Floats
-) -> None:
-    """Fill `boxes` (W, R, 7) with those of the reported bodies in the frames of the sensors."""
+def _see_boxes(live: Mask, sensors: Sensors, bodies: Bodies, reported: Reported) -> None:
+    """Fill the boxes of the reported bodies."""
     for w in range(len(live)):
         if live[w]:
-            count = reported.counts[w]
-            for n in range(count):
-                for k in range(boxes.shape[2]):
-                    boxes[w, n, k] = bodies.boxes[w, reported.bodies[w, n], k]
-            _copy_rows(seen_by(sensors, w, boxes[w, :count]), boxes[w])
+            boxes = reported.boxes[w, : reported.counts[w]]
+            for n in range(len(boxes)):
+                _copy(bodies.boxes[w, reported.bodies[w, n]], boxes[n])
+            _copy_rows(seen_by(sensors, w, boxes), boxes)
 
 
 @compiled()
@@ -294,7 +287,6 @@ def _look(
     bodies: Bodies,
     outlines: Outlines,
     reported: Reported,
-    boxes: Floats,
     silent: Mask,
     seen: Detected,
     shown: Mask,
@@ -305,14 +297,8 @@ def _look(
         if not live[w]:
             continue
         parts = outlines.counts[w]
-        meshes = Meshes(
-            outlines.corners[w],
-            outlines.faces[w],
-            outlines.edges[w],
-            outlines.starts[w],
-            outlines.owners[w, :parts],
-            outlines.reaches[w],
-        )
+        corners, faces, edges, starts, owners, reaches = outlines.meshes
+        meshes = Meshes(corners[w], faces[w], edges[w], starts[w], owners[w, :parts], reaches[w])
         x, y, z, _, _, _ = sensors.poses[w]
         cos, sin = sensors.turns[w]
         classes = _told_classes(reported, w, bodies.counts[w], silent)
@@ -322,7 +308,7 @@ def _look(
                 cameras,
                 camera,
                 ((x, y, z), (cos, sin)),
-                boxes[w, : reported.counts[w]],
+                reported.boxes[w, : reported.counts[w]],
                 meshes,
                 bodies.poses[w, : bodies.counts[w]],
                 room,
@@ -350,7 +336,7 @@ def _room(live: Mask, cameras: Cameras, bodies: Bodies, outlines: Outlines) -> _
         parts = max(parts, outlines.counts[w] if live[w] else 0)
     for camera in range(len(cameras.sizes)):
         width, height = max(width, cameras.sizes[camera, 0]), max(height, cameras.sizes[camera, 1])
-    counts = parts, outlines.faces.shape[1], outlines.edges.shape[1]
+    counts = parts, outlines.meshes.faces.shape[1], outlines.meshes.edges.shape[1]
     return _Room(
         room_for(counts, width, height),
         empty_line(width, _DEPTHS),
@@ -378,8 +364,8 @@ def _photograph(
     poses: Floats,
     room: _Room,
 ) -> Integers:
-    """The table of what a camera shows around boxes (n, 7) in the frame of the sensor, whose place
-    and turn are told.
+    """Return the table of the bodies that a camera shows around boxes (n, 7), in the frame of the
+    sensor, which is given by place and turn.
     """
     model = model_of(cameras.models, number)
     width, height = cameras.sizes[number]

@@ -1,8 +1,8 @@
 """The state of W worlds, as arrays with a row per world that compiled code takes whole.
 
 W worlds, each with its own numbers of bodies, parts, tracks: tables are as long as the longest
-needs, and `counts` (W,) says how many rows of a world's table are in use. What lies beyond them
-means nothing. World frame, metres and radians, unless it says otherwise.
+needs, and `counts` (W,) says how many rows of a world's table are in use. Rows beyond mean nothing.
+World frame, metres and radians, unless it says otherwise.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -16,6 +16,8 @@ from care_sim.core.belief import MAX_TRACKS
 from care_sim.core.frames import Frame, placed_at, seen_from
 from care_sim.core.grid import Cells
 from care_sim.core.types import Tracks
+from care_sim.sensors.engines.view_kernels import Meshes
+from care_sim.sensors.engines.window_kernels import Parts
 from care_sim.world.approach import Impact
 from care_sim.world.bullet import NO_BODY
 from care_sim.world.world import World
@@ -36,40 +38,29 @@ class Bodies(NamedTuple):
 
 
 class Solids(NamedTuple):
-    """The parts that rays can hit; columns as in `care_sim.world.body_tables.Primitives`: `shapes`
-    (W, P), `halves` (W, P, 3), `offsets` (W, P, 3), `owners` (W, P).
-    """
+    """Parts that rays can hit: `counts` (W,) of them, and their columns (W, P, ...)."""
 
     counts: Integers
-    shapes: Integers
-    halves: Floats
-    offsets: Floats
-    owners: Integers
+    parts: Parts
 
 
 class Outlines(NamedTuple):
-    """The parts that cameras see; columns as in
-    `care_sim.sensors.engines.view_kernels.Meshes`: `corners` (W, C, 3), `faces` (W, F, 4), `edges`
-    (W, D, 2), `starts` (W, K + 1, 3), `owners` (W, K), `reaches` (W, K).
-    """
+    """Parts that cameras see: `counts` (W,) of them, and their columns (W, ...)."""
 
     counts: Integers
-    corners: Floats
-    faces: Floats
-    edges: Integers
-    starts: Integers
-    owners: Integers
-    reaches: Floats
+    meshes: Meshes
 
 
 class Reported(NamedTuple):
-    """The bodies that perception reports, by ascending id: `bodies` (W, R) and their `classes`
-    (W, R); and `by_body` (W, B) the class of every body, -1 without one.
+    """The bodies that perception reports, by ascending id: `bodies` (W, R), their `classes` (W, R)
+    and, in the frames of the sensors, their `boxes` (W, R, 7) at the coming keyframe; and `by_body`
+    (W, B) the class of every body, -1 without one.
     """
 
     counts: Integers
     bodies: Integers
     classes: Integers
+    boxes: Floats
     by_body: Integers
 
 
@@ -97,12 +88,12 @@ class Sensors(NamedTuple):
         return cls(np.zeros((worlds, 6)), np.zeros((worlds, 2)), np.zeros((worlds, 2)))
 
     def frame(self, world: int) -> Frame:
-        """That of a world."""
+        """Return the frame of a world."""
         x, y, z, yaw, _, _ = self.poses[world].tolist()
         return Frame(x, y, z, yaw)
 
     def put(self, world: int, frame: Frame) -> None:
-        """Write that of a world."""
+        """Write the frame of a world."""
         self.poses[world, :4] = frame.x, frame.y, frame.z, frame.yaw
         self.turns[world] = np.cos(frame.yaw), np.sin(frame.yaw)
         self.turns_back[world] = frame.turn_back
@@ -142,7 +133,7 @@ class Fired(NamedTuple):
 
 
 class Passages(NamedTuple):
-    """What happened while the worlds moved on to the next keyframe; (W,) each, columns as in
+    """Events while the worlds moved to the next keyframe; (W,) each, columns as in
     `care_sim.world.approach.ClosestApproach`: `nearest_m`, `clearance_m`; whether there was an
     impact, `hit`, and the ego's speed `impact_speed_mps` at the first one. `impacts` holds these
     first impacts by world.
@@ -171,24 +162,29 @@ class State:
         )
         self.solids = Solids(
             _counts(worlds),
-            np.zeros((worlds, _PARTS), np.int64),
-            np.zeros((worlds, _PARTS, 3)),
-            np.zeros((worlds, _PARTS, 3)),
-            np.zeros((worlds, _PARTS), np.int64),
+            Parts(
+                np.zeros((worlds, _PARTS), np.int64),
+                np.zeros((worlds, _PARTS, 3)),
+                np.zeros((worlds, _PARTS, 3)),
+                np.zeros((worlds, _PARTS), np.int64),
+            ),
         )
         self.outlines = Outlines(
             _counts(worlds),
-            np.zeros((worlds, _CORNERS, 3)),
-            np.zeros((worlds, _CORNERS, 4)),
-            np.zeros((worlds, _CORNERS, 2), np.int64),
-            np.zeros((worlds, _PARTS, 3), np.int64),
-            np.zeros((worlds, _PARTS), np.int64),
-            np.zeros((worlds, _PARTS)),
+            Meshes(
+                np.zeros((worlds, _CORNERS, 3)),
+                np.zeros((worlds, _CORNERS, 4)),
+                np.zeros((worlds, _CORNERS, 2), np.int64),
+                np.zeros((worlds, _PARTS, 3), np.int64),
+                np.zeros((worlds, _PARTS), np.int64),
+                np.zeros((worlds, _PARTS)),
+            ),
         )
         self.reported = Reported(
             _counts(worlds),
             np.zeros((worlds, _BODIES), np.int64),
             np.zeros((worlds, _BODIES), np.int64),
+            np.zeros((worlds, _BODIES, 7)),
             np.full((worlds, _BODIES), -1),
         )
         self.tracks = TrackTables(
@@ -249,6 +245,7 @@ def load(state: State, world: int, built: World) -> None:
     state.reported = reported._replace(
         bodies=filled(reported.bodies, world, np.array([*labels], np.int64)),
         classes=filled(reported.classes, world, np.array([*labels.values()], np.int64)),
+        boxes=filled(reported.boxes, world, np.zeros((len(labels), 7))),
     )
 
 
@@ -268,17 +265,14 @@ def load_bodies(state: State, world: int, built: World) -> None:
     length, by_body = state.bodies.boxes.shape[1], state.reported.by_body
     if length > by_body.shape[1]:
         state.reported = state.reported._replace(by_body=longer(by_body, length, empty=-1))
-    parts = primitives.tables
-    state.solids.counts[world] = len(parts[-1])
-    state.solids = Solids(state.solids.counts, *_all_filled(state.solids[1:], world, parts))
-    meshes = built.bullet.polyhedra.tables
-    state.outlines.counts[world] = len(meshes[-1])
-    outlines = _all_filled(state.outlines[1:], world, meshes)
-    state.outlines = Outlines(state.outlines.counts, *outlines)
+    solids, outlines = state.solids, state.outlines
+    parts, meshes = primitives.tables, built.bullet.polyhedra.tables
+    solids.counts[world], outlines.counts[world] = len(parts[-1]), len(meshes[-1])
+    state.solids = Solids(solids.counts, Parts(*_all_filled(solids.parts, world, parts)))
+    state.outlines = Outlines(outlines.counts, Meshes(*_all_filled(outlines.meshes, world, meshes)))
 
 
 def _all_filled(
     tables: Iterable[np.ndarray], world: int, columns: Iterable[np.ndarray]
 ) -> Iterator[np.ndarray]:
-    for table, rows in zip(tables, columns, strict=True):
-        yield filled(table, world, rows)
+    return (filled(table, world, rows) for table, rows in zip(tables, columns, strict=True))

@@ -52,7 +52,7 @@ def test_a_reader_takes_the_first_free_cells_of_the_order(floor, demanded, budge
     order = floor_order(floor, 400).tolist()
     assert sorted(order) == [*range(400)]
     chosen = np.isin(np.arange(400), [*demanded])
-    count = top_up(chosen, len(demanded), floor, budget)
+    count = top_up(floor, np.arange(400), chosen, len(demanded), budget)
     free = [cell for cell in order if cell not in demanded]
     expected = demanded.union(free[: max(0, budget - len(demanded))])
     assert set(np.flatnonzero(chosen).tolist()) == expected
