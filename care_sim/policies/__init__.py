@@ -30,6 +30,7 @@ from care_sim.policies.makers import (
 )
 from care_sim.policies.own.boxes import Boxes
 from care_sim.policies.own.care import CareSector, CareSightlines, CareSpread
+from care_sim.policies.own.care_aimed import CareAimed
 from care_sim.policies.own.care_units import CareUnits
 from care_sim.policies.paper.blind import BeamReduce, FarthestPoints, Full, Random, RandomPoints
 from care_sim.policies.paper.reserves import AllCamera, Care, CarePriority, CareSbf
@@ -79,6 +80,7 @@ BUILT_IN: dict[str, PolicyMaker | EntryPoint] = {
         CareSightlines,
         CareSector,
         CareUnits,
+        CareAimed,
         AfterShoouri,
         AfterAncha,
         AfterGofer,

@@ -39,6 +39,8 @@ OWN = {"care-spread": 1, "care-sightlines": 2, "care-sector": 2}
 """The policies of our own, and the layer of each in which its hulls come first."""
 CORE_FIRST = (*OWN, "boxes", "place-hulls", "care-units", "learned-sets")
 """The policies that list their sets with the core first."""
+AIMED = ("care-aimed",)
+"""The policies with an order of their own (`tests/policies/own/test_care_aimed.py`)."""
 SEEING = [
     name
     for name in BUILT_IN
@@ -119,6 +121,7 @@ def test_it_keeps_to_the_budget_repeats_itself_and_shares_nothing(case):
         ("care-sbf", {"k_safe": 0.0, "decay_per_keyframe": 0.25}),
         ("care-sightlines", {}),
         ("care-units", {}),
+        ("care-aimed", {}),
         ("sweep", {}),
         ("seed-finder", {}),
     ],
@@ -138,7 +141,7 @@ def test_asking_again_changes_nothing(name, parameters, encounter, environment):
             assert sorted(cells.tolist()) == np.flatnonzero(action).tolist()
 
 
-@pytest.mark.parametrize("name", [name for name in SEEING if name not in CORE_FIRST])
+@pytest.mark.parametrize("name", [name for name in SEEING if name not in (*CORE_FIRST, *AIMED)])
 def test_a_policy_lists_its_sets_row_by_row_from_the_top(name, encounter, environment):
     """As the paper has it: in ascending index. So naming that order changes no action; nor does any
     order that of a pattern.

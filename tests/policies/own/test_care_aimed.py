@@ -1,0 +1,147 @@
+"""Cells that aim at the middle of a target, and boxes that the previous picture did not show."""
+
+import math
+
+import gymnasium
+import numpy as np
+import pytest
+
+import care_sim
+from care_sim.base.errors import InvalidInput
+from care_sim.core.cells.sets import CellSets
+from care_sim.core.residual import explained, wedges
+from care_sim.core.rig import Rig
+from care_sim.core.types import Ego
+from care_sim.policies.own.care_aimed import (
+    CareAimed,
+    aimed,
+    box_places,
+    have_counterparts,
+    standing_still,
+)
+
+
+def rectangle(left, right, top, bottom):
+    columns = np.arange(left, right + 1) % 512
+    return np.concatenate([np.sort(row * 512 + columns) for row in range(top, bottom + 1)])
+
+
+@pytest.mark.parametrize("left", [250, 506, 0])
+def test_a_set_begins_above_half_its_height_in_its_middle(left):
+    """Without margins, rows 9 to 13 of 11 columns: 40% below the top is the edge of rows 10 and
+    11. A set over the seam is no other.
+    """
+    (cells,) = aimed(CellSets.of([rectangle(left, left + 10, 8, 14)]), Rig())
+    middle = (left + 5) % 512
+    assert {*cells[:2].tolist()} == {10 * 512 + middle, 11 * 512 + middle}
+    assert sorted(cells) == sorted(rectangle(left, left + 10, 8, 14))
+    last = {row * 512 + (left + side) % 512 for row in (8, 14) for side in (0, 10)}
+    assert cells[-1] in last
+
+
+def test_each_set_has_its_own_aim():
+    sets = [rectangle(100, 104, 8, 12), rectangle(300, 304, 18, 22)]
+    together = aimed(CellSets.of(sets), Rig())
+    for one, cells in zip(sets, together, strict=True):
+        assert np.array_equal(cells, aimed(CellSets.of([one]), Rig())[0])
+    assert not len(aimed(CellSets.of([]), Rig()))
+
+
+def test_what_stands_still_comes_nearer_and_turns_away():
+    """Half a second at 10 m/s is 5 m; a quarter turn to the left puts what lies ahead right."""
+    places = np.array([[20.0, 0.0], [5.0, 3.0]])
+    moved = standing_still(places, Ego(10.0, 0.0), 0.5)
+    assert moved.tolist() == [[15.0, 0.0], [0.0, 3.0]]
+    turned = standing_still(places[:1], Ego(0.0, math.pi), 0.5)
+    assert np.allclose(turned, [[0.0, -20.0]])
+
+
+def found(now, before, on_foot=True, earlier_on_foot=True):
+    places = [np.array(each, float).reshape(-1, 2) for each in (now, before)]
+    flags = [np.full(len(places[0]), on_foot), np.full(len(places[1]), earlier_on_foot)]
+    return have_counterparts((places[0], flags[0]), (places[1], flags[1])).tolist()
+
+
+def test_counterparts_are_one_to_one_the_nearest_first():
+    assert found([[8, 0], [8, 1]], [[8, 1.2]]) == [False, True]
+    assert found([[8, 0], [8, 1]], [[8, 1.2], [8, -1]]) == [True, True]
+
+
+@pytest.mark.parametrize(
+    ("now", "before", "is_found"),
+    [([8, 0], [8, 2.9], True), ([8, 0], [8, 3.1], False), ([40, 0], [40, 11], True)],
+)
+def test_a_counterpart_is_within_3_m_or_a_third_of_the_range(now, before, is_found):
+    assert found([now], [before]) == [is_found]
+
+
+def test_nobody_on_foot_is_the_counterpart_of_a_vehicle():
+    assert found([[8, 0]], [[8, 0]], on_foot=False) == [False]
+    assert found([[8, 0]], [[8, 0]], on_foot=False, earlier_on_foot=False) == [True]
+    assert found([], [[8, 0]]) == []
+    assert found([[8, 0]], []) == [False]
+
+
+def test_a_box_is_served_fully_where_it_is_new_and_briefly_afterwards(environment, encounter):
+    policy = care_sim.make_policy("care-aimed", environment)
+    before, counts = None, np.zeros(2, int)
+    for observation in encounter:
+        belief = policy.rig.read(observation)
+        policy(observation)
+        detections = belief.detections
+        places = box_places(detections, policy.rig), detections.classes >= 3
+        new = np.ones(len(detections), bool)
+        if before is not None:
+            places_then = standing_still(before[0], belief.ego, policy.rig.keyframe_s)
+            new = ~have_counterparts(places, (places_then, before[1]))
+        residual = ~explained(detections, belief.tracks, policy.rig)
+        fresh, _, _, older, *_ = policy.demanded.layers
+        for sets, chosen, most in ((fresh, residual & new, 24), (older, residual & ~new, 3)):
+            every = aimed(wedges(detections.take(chosen), policy.rig), policy.rig)
+            assert [cells.tolist() for cells in sets] == [cells[:most].tolist() for cells in every]
+        counts += len(fresh), len(older)
+        before = places
+    assert counts.min() > 0
+
+
+def test_front_hulls_and_rows_without_a_camera(belief_of, car):
+    """Row 9 lies at -1.33 degrees, row 10 at -2.67; 0.70 degrees a column."""
+    fresh, (front,), (hull,), older, rest, (more,), (second,), (row,), (rows,) = (
+        CareAimed(Rig()).demand(belief_of([car(1, 12, 0)])).layers
+    )
+    assert [len(fresh), len(older), len(rest)] == [0, 0, 0]
+    assert sorted(front) == [*range(9 * 512 + 171, 9 * 512 + 341)]
+    assert {*front[:2].tolist()} == {9 * 512 + 255, 9 * 512 + 256}
+    assert sorted(second) == [*range(10 * 512 + 171, 10 * 512 + 341)]
+    assert [len(hull), len(more)] == [3, 8]
+    assert not {*hull.tolist()} & {*more.tolist()}
+    assert len(row) == 512
+    assert len(rows) == 819
+
+
+def test_what_is_switched_off_is_not_there(environment, encounter, belief_of, car):
+    policy = CareAimed(Rig(), front=False, aim=False)
+    belief = belief_of([car(1, 12, 0)])
+    _, front, (hull,), _, _, _, second, *_ = policy.demand(belief).layers
+    assert [len(front), len(second)] == [0, 0]
+    listed = policy.rig.listed(policy.rig.hulls(belief.tracks.boxes), "core-spread", 3)
+    assert hull.tolist() == listed[0].tolist()
+    policy = care_sim.make_policy("care-aimed", environment, new=False)
+    for observation in encounter:
+        policy(observation)
+        assert not len(policy.demanded.layers[3])
+
+
+def test_sets_follow_the_cell_order_of_the_rig(belief_of, car):
+    belief = belief_of([car(1, 12, -9)])
+    with gymnasium.make("CARE-Dense-v0", cell_order="rows-down") as env:
+        policy = care_sim.make_policy("care-aimed", env)
+        (hull,) = policy.demand(belief).layers[2]
+        (whole,) = policy.rig.hulls(belief.tracks.boxes)
+    assert hull.tolist() == sorted(whole)[:3]
+
+
+@pytest.mark.parametrize("wrong", [{"hull_cells": 0}, {"aim": 1}, {"new": 1}, {"front": 1}])
+def test_wrong_settings_are_refused(wrong):
+    with pytest.raises(InvalidInput, match=next(iter(wrong))):
+        CareAimed(Rig(), **wrong)
