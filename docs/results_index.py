@@ -17,8 +17,8 @@ Every folder holds the rows of one study, its tables, and `config.json`: the com
 configurations, seeds, versions, a hash of the code, the machine. `care-sim report FOLDER` makes all
 tables and figures again. [How to read the rows](../../docs/rows.md).
 
-Beside them lie `b90`, the result files of the [benchmark](../b90.md)
-(`python docs/b90_results.py`; folders in it are of other detectors), `judge-streets` and
+Beside them lie `b90`, the tables of the [benchmark](../b90.md) (`python docs/b90_results.py`; its
+entries are in `care_sim/study/benchmark/references.json`), `judge-streets` and
 `judge-logs`, what `care-sim judge` says of [detectors](../detectors.md), and `bench.json` and
 `parity.json`, of `make bench` and `make parity`.
 
