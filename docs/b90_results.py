@@ -1,11 +1,11 @@
-"""The published plays of B90: `results/data/b90`, and the entries that stand beside everybody's.
+"""The published plays of B90: the entries that stand beside everybody's, which are the package's
+(`care_sim.study.benchmark.result.references`), and `results/data/b90`.
 
     python docs/b90_results.py --recorded nuscenes:DATA argoverse2:DATA kitti:DATA boreas
 
-plays the published entries under every detector, and writes result files, tables and figure. The
-folder `--plays` keeps what is finished: the same command resumes. With `--tables` nothing plays;
-tables, figure, the table of `results/b90.md` and the entries of the package are made from the
-result files.
+plays the published entries under every detector, and writes results, tables and figure. The folder
+`--plays` keeps what is finished: the same command resumes. With `--tables` nothing plays;
+tables, figure and the table of `results/b90.md` are made from the results.
 """
 
 import re
@@ -19,6 +19,8 @@ from care_sim.base.interrupts import FAILED
 from care_sim.reports.budgets import (
     budget_tables,
     format_budget,
+    ideas_table,
+    parts_table,
     sorted_by_budget,
 )
 from care_sim.reports.figures.budgets import BUDGETS_FIGURE, budgets_figure
@@ -26,6 +28,7 @@ from care_sim.reports.figures.styles import save
 from care_sim.reports.recorded import sources_table
 from care_sim.reports.statements import columns_table, statements_table
 from care_sim.reports.table import Table
+from care_sim.study.benchmark.bounds import BOUNDS
 from care_sim.study.benchmark.budgets import (
     MAIN_DETECTOR,
     REFERENCE_ENTRIES,
@@ -35,33 +38,61 @@ from care_sim.study.benchmark.budgets import (
 )
 from care_sim.study.benchmark.play import player_in
 from care_sim.study.benchmark.recorded import recorded_drives
-from care_sim.study.benchmark.result import publish_references, read_result
+from care_sim.study.benchmark.result import (
+    publish_references,
+    read_list,
+    references,
+    write_list,
+)
 from care_sim.study.benchmark.suite import STREETS, Entry
 from care_sim.study.runner import by_reason
 
 PAGE = Path(__file__).parents[1] / "results" / "b90.md"
 FOLDER = PAGE.parent / "data" / "b90"
 DETECTORS = (MAIN_DETECTOR, "megvii", "pointrcnn", "returns")
-"""The main one first. The files of the others are in folders by their names."""
+"""The main one first. The results under each of the others are a file by its name."""
 DRAWN = ("care-sector", "care-sightlines", "after-ancha", "tuned-place", "learned-sets", "care")
 """The policies of the figure, without parameters."""
 COMMAND = "python docs/b90_results.py --recorded nuscenes:DATA argoverse2:DATA kitti:DATA boreas"
+WHOLE = "care-sector"
+WITHOUT = {
+    "residual": Entry(WHOLE, (("residual", False),)),
+    "tracks": Entry(WHOLE, (("tracks", False),)),
+    "explained boxes": Entry(WHOLE, (("explained", False),)),
+    "sector ahead": Entry(WHOLE, (("sector", False),)),
+    "core first": Entry(WHOLE, cell_order="rows-down"),
+}
+"""The policy `WHOLE` with one idea removed."""
+MORE = [*BOUNDS, *(entry for entry in WITHOUT.values() if entry not in REFERENCE_ENTRIES)]
+TRIAL = FOLDER / "trial.json"
+"""The results of bounds and of ideas that are no published entries: on the streets of a trial, and
+on all drives.
+"""
 
 
-def folder_of(detector: str) -> Path:
-    """Return the folder of the result files under a detector."""
-    return FOLDER if detector == MAIN_DETECTOR else FOLDER / detector
+def entries_of(detector: str) -> list[BudgetResult]:
+    """Return the published entries under a detector, in their order; none before it has played."""
+    if detector == MAIN_DETECTOR:
+        return references(detector)
+    path = FOLDER / f"{detector}.json"
+    return read_list(path) if path.exists() else []
 
 
-def results_of(detector: str) -> list[BudgetResult]:
-    """Read the published results under a detector, in the order of the entries."""
-    found = [read_result(path) for path in folder_of(detector).glob("*.json")]
-    return sorted(found, key=lambda one: REFERENCE_ENTRIES.index(one.entry))
+def trial() -> list[Table]:
+    """Return the tables of the worlds of `TRIAL`: the entries with the bounds, and what each idea
+    of `WHOLE` is worth.
+    """
+    played = read_list(TRIAL)
+    published = references(MAIN_DETECTOR, played[0].worlds)
+    known = {one.entry: one for one in [*played, *published]}
+    without = {idea: known[entry] for idea, entry in WITHOUT.items()}
+    bounded = [known[entry] for entry in (*REFERENCE_ENTRIES, *BOUNDS)]
+    return [parts_table(bounded), ideas_table(known[Entry(WHOLE)], without)]
 
 
 def statements() -> list[Table]:
     """Return the tables over all detectors that have played, on streets; none for the main one."""
-    columns = {detector: results_of(detector) for detector in DETECTORS}
+    columns = {detector: entries_of(detector) for detector in DETECTORS}
     streets = {
         detector: [one.of_part(STREETS) for one in results]
         for detector, results in columns.items()
@@ -74,11 +105,11 @@ def summary_table() -> Table:
     """Return the table of `results/b90.md`: a line per entry with its B90, that of each part, and
     that of the streets under each other detector that has played.
     """
-    ordered = sorted_by_budget(results_of(MAIN_DETECTOR))
+    ordered = sorted_by_budget(entries_of(MAIN_DETECTOR))
     others = {
         detector: {one.entry: one for one in results}
         for detector in DETECTORS[1:]
-        if (results := results_of(detector))
+        if (results := entries_of(detector))
     }
     parts = ordered[0].parts
     rows = (
@@ -105,38 +136,44 @@ def with_table(page: str) -> str:
 
 
 def written() -> str:
-    """Return the text of `tables.md` as the result files are now."""
-    main = results_of(MAIN_DETECTOR)
-    tables = [summary_table(), *budget_tables(main), sources_table(main), *statements()]
+    """Return the text of `tables.md` as the results are now."""
+    main = entries_of(MAIN_DETECTOR)
+    tables = [
+        summary_table(),
+        *budget_tables(main),
+        sources_table(main),
+        *trial(),
+        *statements(),
+    ]
     told = "\n".join(table.markdown() for table in tables)
     return f"# B90\n\nMade by `{COMMAND}`.\n\n{told}"
 
 
 def play(options: Namespace) -> None:
-    """Play the published entries under the detectors, and write their files. Exits with 1, and
-    writes no file of a detector, where one of its plays failed.
+    """Play the published entries under the detectors, and write their results. Exits with 1, and
+    writes no results of a detector, where one of its plays failed.
     """
-    worlds = budget_worlds(recorded=recorded_drives(options.recorded))
-    streets = {STREETS: worlds[STREETS]}
+    drives = recorded_drives(options.recorded)
+    worlds, fewer = (budget_worlds(quick, recorded=drives) for quick in (False, True))
     with player_in(options.plays, options.workers) as player:
         for detector in options.detectors:
+            is_main = detector == MAIN_DETECTOR
             # Other detectors are columns over streets alone.
-            played = worlds | streets if detector == MAIN_DETECTOR else streets
+            played = worlds if is_main else {STREETS: worlds[STREETS]}
             results = play_budgets(REFERENCE_ENTRIES, player, detector, played)
+            more = play_budgets(MORE if is_main else (), player, detector, fewer, quick=True)
             if player.failures:
                 report_problems(by_reason(player.failures, "plays"))
                 raise SystemExit(FAILED)
-            for result in results:
-                result.write(folder_of(detector) / f"{stem_of(result.entry)}.json")
-
-
-def stem_of(entry: Entry) -> str:
-    """Return the name of the result file of an entry."""
-    return re.sub(r"[^\w.=-]+", "-", entry.full_name)
+            if is_main:
+                publish_references(results)
+                write_list(TRIAL, more)
+            else:
+                write_list(FOLDER / f"{detector}.json", results)
 
 
 def main(words: Sequence[str] | None = None) -> None:
-    """Play what `words` say, and write tables, figure and the entries of the package."""
+    """Play what `words` say, and write tables and figure."""
     parser = ArgumentParser(description=__doc__)
     parser.add_argument("--recorded", nargs="+", default=[])
     parser.add_argument("--detectors", nargs="+", default=DETECTORS, choices=DETECTORS)
@@ -148,9 +185,7 @@ def main(words: Sequence[str] | None = None) -> None:
         parser.error("give --recorded the recorded drives of the published entries, or --tables")
     if not options.tables:
         play(options)
-    results = results_of(MAIN_DETECTOR)
-    publish_references(results)
-    drawn = [one for one in results if one.entry.policy in DRAWN]
+    drawn = [one for one in entries_of(MAIN_DETECTOR) if one.entry.policy in DRAWN]
     save(budgets_figure(drawn), FOLDER / BUDGETS_FIGURE)
     write_text(FOLDER / "tables.md", written())
     write_text(PAGE, with_table(PAGE.read_text(encoding="utf-8")))

@@ -70,12 +70,11 @@ Counts = Sequence[PartCounts]
 
 
 class SmallestBudget(NamedTuple):
-    """B90 with its interval, as shares of all cells, and the count that reaches 90% last."""
+    """B90 with its interval, as shares of all cells."""
 
     budget: float
     low: float
     high: float
-    held_back_by: str
 
 
 def names_of(counts: Counts) -> tuple[str, ...]:
@@ -108,9 +107,8 @@ def smallest_budget(counts: Counts, draws: Floats | None = None) -> SmallestBudg
     """Return B90 of an entry; `draws` are its `resampled_budgets`, if known. A count that is 0 for
     the full scan needs no cell.
     """
-    each = reaching(counts)
     low, high = _interval(resampled_budgets(counts) if draws is None else draws)
-    return SmallestBudget(float(each.max()), low, high, names_of(counts)[int(each.argmax())])
+    return SmallestBudget(float(reaching(counts).max()), low, high)
 
 
 def budget_ratio(ours: Counts, theirs: Counts) -> tuple[float, float, float]:

@@ -70,6 +70,11 @@ class Truth:
     def __init__(self, env: Any):
         self._env = env
 
+    @property
+    def loop(self) -> Any:
+        """The running loop, with all that is true in it."""
+        return self._env.loop
+
     def boxes(self, tracks: Tracks) -> Floats:
         """(n, 7) true boxes, in the sensor frame, of the objects behind the tracks.
 

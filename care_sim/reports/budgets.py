@@ -1,7 +1,7 @@
 """Tables of B90: how few cells each entry needs, and the count that limits it."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import isinf
 
 from care_sim.base.errors import counted
@@ -33,6 +33,7 @@ _INTERVALS = "Intervals are over worlds."
 _NO_INTERVAL = f"Fewer than {LEAST_WORLDS} worlds carry no interval."
 _TIED = "Tied entries share ranks, such as 1-3: the interval of their paired ratio includes 1."
 _TIMED = "ms: p50 / p99 of a decision of the policy on streets, on the machine of its file."
+_LEAST = "≤: the smallest budget is enough."
 _TRIAL = "A trial on the streets that --quick plays."
 
 
@@ -55,7 +56,7 @@ def budgets_table(results: Sequence[BudgetResult]) -> Table:
     """
 
     def cells(one: BudgetResult) -> TableRow:
-        return one.score.held_back_by, *map(format_budget, reaching(one.counts))
+        return one.held_back_by, *map(format_budget, reaching(one.counts))
 
     return _table(results, ("held back by", *names_of(results[0].counts)), cells)
 
@@ -66,12 +67,34 @@ def parts_table(results: Sequence[BudgetResult]) -> Table:
     """
 
     def cells(one: BudgetResult) -> TableRow:
-        alone = {part: one.of_part(part) for part in one.parts}
-        worst = max(alone, key=lambda part: alone[part].score.budget)
-        last = f"{worst}: {alone[worst].score.held_back_by}"
-        return last, *(format_smallest(own) for own in alone.values())
+        return one.held_back_by, *(format_smallest(one.of_part(part)) for part in one.parts)
 
     return _table(results, ("held back by", *results[0].parts), cells)
+
+
+def ideas_table(whole: BudgetResult, without: Mapping[str, BudgetResult]) -> Table:
+    """Return a table with a line per idea that a policy plays `without`, the one that costs most
+    cells first: B90, and its ratio to the `whole` policy's over all parts and on each.
+    """
+    dearest_first = sorted(without, key=lambda idea: -without[idea].score.budget)
+    rows = [
+        (
+            f"without {idea}",
+            format_smallest(own := without[idea]),
+            own.held_back_by,
+            format_ratio(own, whole),
+            *(format_ratio(own.of_part(part), whole.of_part(part)) for part in whole.parts),
+        )
+        for idea in dearest_first
+    ]
+    name = whole.entry.name
+    return Table(
+        f"What each idea of {name} is worth: B90 without it, {_worlds(whole)}, {whole.detector}",
+        ("policy", "B90", "held back by", f"times {name}", *whole.parts),
+        tuple(rows),
+        (f"{NOTE} Parts hold the ratio too. Bold ratios exclude 1.",),
+        whole=("B90",),
+    )
 
 
 def _table(
@@ -101,17 +124,24 @@ def _table(
         f"How few cells are enough: B90, {_worlds(results[0])}, {results[0].detector}",
         ("rank", "policy", "B90", *columns, *last, *(("ms",) if is_timed else ())),
         tuple(rows),
-        (*_notes(results, is_timed), *tag_notes(each.tags for each in results)),
+        (*_notes(results, is_timed, rows), *tag_notes(each.tags for each in results)),
         whole=("rank", "B90"),
         names=2,
     )
 
 
-def _notes(results: Sequence[BudgetResult], is_timed: bool) -> list[str]:
+def _notes(results: Sequence[BudgetResult], is_timed: bool, rows: Sequence[TableRow]) -> list[str]:
     has_ranks = has_interval(results[0].counts)
     intervals = _INTERVALS if has_ranks else _NO_INTERVAL
     is_trial = STREETS in results[0].parts and any(each.quick for each in results)
-    notes = {f"{NOTE} {intervals}": True, _TIED: has_ranks, _TIMED: is_timed, _TRIAL: is_trial}
+    has_least = any("≤" in entry for row in rows for entry in row)
+    notes = {
+        f"{NOTE} {intervals}": True,
+        _TIED: has_ranks,
+        _TIMED: is_timed,
+        _TRIAL: is_trial,
+        _LEAST: has_least,
+    }
     return [note for note, is_due in notes.items() if is_due]
 
 
@@ -160,7 +190,7 @@ def _worlds(result: BudgetResult) -> str:
 
 def format_smallest(result: BudgetResult) -> str:
     """Format B90 of a result, with its interval where there are worlds enough for one."""
-    budget, low, high = map(format_budget, result.score[:3])
+    budget, low, high = map(format_budget, result.score)
     return f"{budget} [{low}, {high}]" if has_interval(result.counts) else budget
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from care_sim.evaluation.smallest_budget import BUDGETS
-from care_sim.reports.budgets import budget_tables, budgets_table, format_budget
+from care_sim.reports.budgets import budget_tables, budgets_table, format_budget, ideas_table
 from care_sim.reports.figures.budgets import budgets_figure
 from care_sim.reports.figures.leaderboard import leaderboard_figure
 from care_sim.reports.recorded import sources_table
@@ -134,6 +134,20 @@ def test_fewer_than_five_worlds_of_a_part_carry_no_interval():
     assert [row[2] for row in streets.rows] == ["2.4 [2.4, 2.4]", "3.9 [3.9, 3.9]"]
     told = "Fewer than 5 worlds carry no interval."
     assert [told in table.notes[0] for table in (whole, streets, drives)] == [True, False, True]
+
+
+def test_the_idea_that_is_worth_most_comes_first():
+    whole = made_budgets("care-sector", HALF_WAY, recorded=DRIVES, later=HALF_WAY)
+    later = made_budgets(PLAIN, (0.1, 0.2, 0.3, 0.8, 1.0, 1.0, 1.0), recorded=DRIVES)
+    nothing = replace(whole, entry=Entry("care-sector", (("rows", False),)))
+    never = made_budgets("boxes", HALF_WAY, recorded=DRIVES, later=NEVER)
+    table = ideas_table(whole, {"rows": nothing, "camera": never, "residual": later})
+    assert table.columns[3:] == ("times care-sector", "streets", "recorded")
+    assert [(row[0], *row[2:]) for row in table.rows] == [
+        ("without camera", "recorded: emerging", "never", "1.00 [1.00, 1.00]", "never"),
+        ("without residual", "streets: emerging", *["1.58 [1.58, 1.58]"] * 3),
+        ("without rows", "streets: emerging", *["1.00 [1.00, 1.00]"] * 3),
+    ]
 
 
 def test_recorded_drives_by_source():

@@ -13,7 +13,7 @@ from care_sim.study.benchmark.recorded import AHEAD, RECORDED, recorded_drives
 from care_sim.study.benchmark.result import read_result
 from care_sim.study.benchmark.suite import DRIVES, STREETS, TESTS, Entry
 from tests.helpers import kitti_drive
-from tests.helpers.made_budgets import HALF_WAY, NEVER, made_budgets
+from tests.helpers.made_budgets import ALWAYS, HALF_WAY, NEVER, made_budgets
 
 
 def test_streets_are_test_seeds_and_a_trial_plays_the_first_of_them():
@@ -90,8 +90,19 @@ def test_a_file_holds_streets_and_drives(tmp_path, monkeypatch):
     content = json.loads((tmp_path / "mine.json").read_text())
     assert [*content["counts"]] == ["streets", "recorded ahead", "recorded"]
     assert content["b90_percent"][0] == "never"
+    assert content["held_back_by"] == "recorded ahead: emerging"
     assert result.of_part(STREETS).score.budget < 0.03
     assert result.of_part(AHEAD).worlds == ((AHEAD, "kitti/0000"),)
+
+
+def test_what_holds_an_entry_back_names_the_part_where_there_are_several():
+    curves = ALWAYS, ALWAYS, HALF_WAY, ALWAYS
+    drives = [f"boreas/{n}" for n in range(2)]
+    one = made_budgets("care", *curves)
+    assert one.held_back_by == "kept"
+    assert made_budgets("care", *curves, recorded=drives).held_back_by == "streets: kept"
+    late = made_budgets("care", *curves, recorded=drives, later=NEVER)
+    assert late.held_back_by == "recorded: emerging"
 
 
 def test_entries_share_the_full_scan():

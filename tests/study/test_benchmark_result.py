@@ -165,6 +165,20 @@ def test_published_entries_stand_beside_results_of_the_same_worlds(tmp_path, mon
     assert len(with_references([replace(mine, sealed="5" * 64)])) == 1
 
 
+def test_published_entries_are_parsed_once(tmp_path, monkeypatch):
+    """Every file that the leaderboard reads is compared with them."""
+    path = tmp_path / "references.json"
+    monkeypatch.setattr(module, "_REFERENCES", path)
+    publish_references([made_budgets("care", HALF_WAY), made_budgets("place", ALWAYS)])
+    parsed = []
+    kept = module.result_of
+    monkeypatch.setattr(module, "result_of", lambda *given: parsed.append(given) or kept(*given))
+    assert references("centerpoint") == references("centerpoint")
+    assert len(parsed) == 2
+    publish_references([made_budgets("boxes", HALF_WAY)])
+    assert [one.entry.policy for one in references("centerpoint")] == ["boxes"]
+
+
 def test_numbers_that_are_no_counts_have_no_score():
     result = made_budgets("care", HALF_WAY)
     damaged = BudgetRow(STREETS, 203, (1.0,) * 4, ((math.nan,) * 4,) * 7)

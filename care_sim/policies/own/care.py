@@ -99,7 +99,8 @@ class CareSector(Policy):
     - more of the hulls
     - the pattern `rows` instead of the random floor
 
-    With `residual=False` every wedge counts as unexplained.
+    Each idea can be switched off, to measure its worth: `residual` (every wedge counts as
+    unexplained), `camera` (all wedges), `tracks` (all hulls), `explained`, `sector`, `rows`.
     """
 
     name = "care-sector"
@@ -107,28 +108,50 @@ class CareSector(Policy):
     told: ClassVar[Mapping[str, str]] = {"min_returns": "min_returns"}
     keeps_order = True
 
-    def __init__(self, rig: Rig, min_returns: int = MIN_RETURNS, residual: bool = True):
+    def __init__(
+        self,
+        rig: Rig,
+        min_returns: int = MIN_RETURNS,
+        residual: bool = True,
+        camera: bool = True,
+        tracks: bool = True,
+        explained: bool = True,
+        sector: bool = True,
+        rows: bool = True,
+    ):
         super().__init__(rig)
         self._round = Round.of(min_returns)
-        check_flag("residual", residual)
+        _check_switches(
+            residual=residual,
+            camera=camera,
+            tracks=tracks,
+            explained=explained,
+            sector=sector,
+            rows=rows,
+        )
         self._uses_residual = residual
-        self._rows = cells_by_row(rig)
+        self._uses_camera = camera
+        self._follows = tracks
+        self._rechecks = explained
+        self._rows = cells_by_row(rig)[: None if rows else 0]
         entries = entry_cells(rig)
         self._entries = len(entries)
-        self._sector = entries[columns_ahead(rig.grid)]
+        self._sector = entries[columns_ahead(rig.grid)][: None if sector else 0]
 
     def demand(self, belief: Belief) -> Demand:
         """Layers in order of priority; see the class."""
-        unexplained, known = self._camera_layers(belief)
+        unexplained, known = self._camera_layers(belief) if self._uses_camera else ([], [])
         few, more = self._round
         wedges = self.rig.listed(unexplained, CORE_FIRST, WEDGE_ROUNDS * more)
-        hulls = self.rig.listed(self.rig.hulls(belief.tracks.boxes), CORE_FIRST, few + more)
+        rechecked = self.rig.listed(known if self._rechecks else [], CORE_FIRST, few)
+        tracked = self.rig.hulls(belief.tracks.boxes) if self._follows else []
+        hulls = self.rig.listed(tracked, CORE_FIRST, few + more)
         return Demand(
             layers=[
                 wedges.part(0, more),
                 [self._sector],
                 hulls.part(0, few),
-                self.rig.listed(known, CORE_FIRST, few),
+                rechecked,
                 wedges.part(more, WEDGE_ROUNDS * more),
                 [self._rows[: self._entries]],
                 hulls.part(few, few + more),
@@ -140,6 +163,11 @@ class CareSector(Policy):
         if self._uses_residual:
             return camera_layers(belief, self.rig)
         return wedges_of_boxes(belief.detections, self.rig), CellSets.of([])
+
+
+def _check_switches(**switches: bool) -> None:
+    for name, value in switches.items():
+        check_flag(name, value)
 
 
 WEDGE_ROUNDS = 4
@@ -187,15 +215,9 @@ class CareSightlines(Policy):
         super().__init__(rig)
         self._round = Round.of(min_returns)
         check_whole("wedge_rounds", wedge_rounds, 1)
-        switches = {
-            "camera": camera,
-            "ahead": ahead,
-            "explained": explained,
-            "sight_lines": sight_lines,
-            "rows": rows,
-        }
-        for name, value in switches.items():
-            check_flag(name, value)
+        _check_switches(
+            camera=camera, ahead=ahead, explained=explained, sight_lines=sight_lines, rows=rows
+        )
         self._wedge_most = wedge_rounds * self._round.wedge
         self._uses_camera = camera
         self._looks_ahead = ahead

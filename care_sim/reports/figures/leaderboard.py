@@ -42,7 +42,7 @@ def leaderboard_figure(results: Sequence[BudgetResult]) -> Figure:
         }
         size = _SIZES[min(n, len(_SIZES) - 1)]
         axes.scatter([own[n] for own in needs], lines, s=size, zorder=3, **look)
-    ends = [[_place(value) for value in each.score[:3]] for each in upwards]
+    ends = [[_place(value) for value in each.score] for each in upwards]
     budgets = [budget for budget, _, _ in ends]
     spans = [[b - low for b, low, _ in ends], [high - b for b, _, high in ends]]
     label = "B90, 95% interval"

@@ -23,6 +23,7 @@ from care_sim.evaluation.smallest_budget import (
     Counts,
     PartCounts,
     SmallestBudget,
+    reaching,
     resampled_budgets,
     smallest_budget,
 )
@@ -143,6 +144,13 @@ class BudgetResult:
         """B90 of the entry."""
         return smallest_budget(self.counts, self.draws)
 
+    @property
+    def held_back_by(self) -> str:
+        """The count that reaches 90% last, with its part where there are several."""
+        names = [(part, name) for part in self.parts for name in COUNTS[part]]
+        part, name = names[int(reaching(self.counts).argmax())]
+        return f"{part}: {name}" if len(self.parts) > 1 else name
+
     def cut_to(self, worlds: Iterable[tuple[str, int | str]]) -> "BudgetResult | None":
         """Return the result in these worlds, in their order; None where one is missing."""
         own = dict(zip(self.worlds, self.rows, strict=True))
@@ -152,12 +160,11 @@ class BudgetResult:
 
     def content(self) -> dict[str, Any]:
         """Return the result as plain data. The score in it is for people; readers use the rows."""
-        score = self.score
         return {
             BUDGET_MARK: BUDGET_VERSION,
             "entry": self.entry.name,
-            "b90_percent": [_percent(value) for value in score[:3]],
-            "held_back_by": score.held_back_by,
+            "b90_percent": [_percent(value) for value in self.score],
+            "held_back_by": self.held_back_by,
             **asdict(self.entry),
             "tags": self.tags,
             "detector": self.detector,

@@ -5,6 +5,7 @@ The score is computed from the rows whenever a file is read; the score in the fi
 
 import json
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -197,9 +198,7 @@ def references(
     """Return the published entries under a detector in these worlds, or in all that they played;
     none without such plays.
     """
-    listed = parsed_json(_REFERENCES.read_text(encoding="utf-8"))
-    results = [result_of(content, _REFERENCES.name) for content in listed]
-    results = [result for result in results if result.detector == detector]
+    results = [result for result in read_list(_REFERENCES) if result.detector == detector]
     if worlds is None:
         return results
     cut = (result.cut_to(worlds) for result in results)
@@ -217,5 +216,21 @@ def with_references(results: Sequence[BudgetResult]) -> list[BudgetResult]:
 
 def publish_references(results: Sequence[BudgetResult]) -> None:
     """For maintainers: make these the published entries."""
+    write_list(_REFERENCES, results)
+
+
+def read_list(path: Path) -> list[BudgetResult]:
+    """Read a list of published results. Raises InvalidInput where one is damaged."""
+    return [*_parsed_list(path.read_text(encoding="utf-8"), path.name)]
+
+
+def write_list(path: Path, results: Sequence[BudgetResult]) -> None:
+    """Write a list of published results, one per line."""
     listed = ",\n".join(json.dumps(result.content()) for result in results)
-    write_text(_REFERENCES, f"[\n{listed}\n]\n")
+    write_text(path, f"[\n{listed}\n]\n")
+
+
+# By the text, since every file that the leaderboard reads is compared with the published entries.
+@lru_cache(maxsize=1)
+def _parsed_list(text: str, origin: str) -> tuple[BudgetResult, ...]:
+    return tuple(result_of(content, origin) for content in parsed_json(text))

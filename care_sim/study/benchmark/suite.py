@@ -40,6 +40,8 @@ _SHORTEST_SALT, _LONGEST_SALT = 32, 4096
 _PACKAGED = re.compile(r"\w[\w.-]*")
 """The form of a policy's name that is no MODULE:OBJECT."""
 _LONGEST_NAME = 120
+BOUNDS_MODULE = "care_sim.study.benchmark.bounds:"
+"""The module of the policies that know the truth; the benchmark plays none for anybody."""
 _UNTABLED = "|<>$`"
 """What tables, pages and figures take for more than text."""
 _SCENARIOS: dict[str, tuple[str, Parameters]] = {
@@ -62,6 +64,9 @@ class Entry:
     @property
     def name(self) -> str:
         """The name in a table, with the names of files and not their folders."""
+        # The label of a bound says what it knows, and the place of its code nothing more.
+        if self.label and self.policy.startswith(BOUNDS_MODULE):
+            return self.label
         played = self._text([(name, _file_name(value)) for name, value in self.parameters])
         return f"{self.label} ({played})" if self.label else played
 

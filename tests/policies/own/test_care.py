@@ -145,9 +145,10 @@ def test_without_the_residual_every_wedge_counts_as_unexplained(environment, enc
     assert explained
 
 
-def test_the_residual_is_a_switch():
-    with pytest.raises(InvalidInput, match="residual"):
-        CareSector(Rig(), residual=1)
+@pytest.mark.parametrize("idea", ["residual", "camera", "tracks", "explained", "sector", "rows"])
+def test_an_idea_is_a_switch(idea):
+    with pytest.raises(InvalidInput, match=idea):
+        CareSector(Rig(), **{idea: 1})
 
 
 def blind(observation):
@@ -173,20 +174,32 @@ def test_without_camera_detections_it_plays_as_without_a_camera(environment, enc
 
 
 @pytest.mark.parametrize(
-    ("idea", "layer"),
-    [("ahead", 1), ("explained", 3), ("sight_lines", 4), ("rows", 6), ("rows", 8)],
+    ("name", "idea", "layers"),
+    [
+        ("care-sightlines", "ahead", [1]),
+        ("care-sightlines", "explained", [3]),
+        ("care-sightlines", "sight_lines", [4]),
+        ("care-sightlines", "rows", [6, 8]),
+        ("care-sector", "camera", [0, 3, 4]),
+        ("care-sector", "sector", [1]),
+        ("care-sector", "tracks", [2, 6]),
+        ("care-sector", "explained", [3]),
+        ("care-sector", "rows", [5, 7]),
+    ],
 )
-def test_an_idea_can_be_switched_off(idea, layer, environment, encounter):
-    policies = [
-        care_sim.make_policy("care-sightlines", environment, **{idea: on}) for on in (True, False)
-    ]
-    asked = [0, 0]
+def test_an_idea_can_be_switched_off(name, idea, layers, environment, encounter):
+    """Its layers are empty, and the others stay."""
+    policies = [care_sim.make_policy(name, environment, **{idea: on}) for on in (True, False)]
+    asked = np.zeros((2, 9), int)
     for observation in encounter:
         for number, policy in enumerate(policies):
             policy(observation)
-            asked[number] += sum(map(len, policy.demanded.layers[layer]))
-    assert asked[0] > 0
-    assert asked[1] == 0
+            sizes = [sum(map(len, layer)) for layer in policy.demanded.layers]
+            asked[number, : len(sizes)] += sizes
+    usual, without = asked
+    assert usual[layers].all()
+    usual[layers] = 0
+    assert without.tolist() == usual.tolist()
 
 
 def test_every_layer_gives_its_part_of_a_set(environment, encounter):
