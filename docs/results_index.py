@@ -17,9 +17,10 @@ A folder holds the rows of one study, their tables, and `config.json`: command, 
 versions, a hash of the code, the machine. `care-sim report FOLDER` makes tables and figures again.
 [Columns](../../docs/rows.md).
 
-`b90` holds the tables of the [benchmark](../b90.md) (`python docs/b90_results.py`). Its entries are in
-`care_sim/study/benchmark/references.json`. `judge-streets` and `judge-logs` hold results of `care-sim judge` on
-[detectors](../detectors.md). `make bench` and `make parity` write `bench.json` and `parity.json`.
+`b90` holds the tables of the [benchmark](../b90.md) (`python docs/b90_results.py`). Its entries are
+in `care_sim/study/benchmark/references.json`. `judge-streets` and `judge-logs` hold results of
+`care-sim judge` on [detectors](../detectors.md). `make bench` and `make parity` write `bench.json`
+and `parity.json`.
 
 *Version* is the version of CARE-Sim that played the rows. Version 0.3.0 draws another random floor,
 so older rows differ from a new run. `make publish` plays all rows again.
