@@ -28,6 +28,7 @@ from care_sim.envs.sensing import Observed, checked_scores
 from care_sim.envs.worlds import Stepped, Worlds
 from care_sim.loops.one_world import OneWorld
 from care_sim.loops.records import Keyframe
+from care_sim.loops.stages.choice import Choice
 from care_sim.policies import tags_of
 from care_sim.policies.base import Policy
 from care_sim.policies.vector import vector_policy
@@ -240,7 +241,9 @@ def play_together(configs: Sequence[EpisodeConfig]) -> list[Row]:
         settings = [model.setting] * count
         if model.setting.detector is not None:
             settings = [closed_loop(config.make_env()).setting for config in configs]
-        with closing(Worlds(settings, observed, exact=False)) as worlds:
+        budgets = np.array([setting.rig.budget for setting in settings])
+        choice = Choice(model.rig, model.conditions, budgets)
+        with closing(Worlds(settings, choice, observed, exact=False)) as worlds:
             infos = worlds.begin({world: config.seed for world, config in enumerate(configs)})
             policy.reset()
             drawn = _common_draws()
