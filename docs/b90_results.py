@@ -51,7 +51,15 @@ PAGE = Path(__file__).parents[1] / "results" / "b90.md"
 FOLDER = PAGE.parent / "data" / "b90"
 DETECTORS = (MAIN_DETECTOR, "megvii", "pointrcnn", "returns")
 """The main one first. The results under each of the others are a file by its name."""
-DRAWN = ("care-sector", "care-sightlines", "after-ancha", "tuned-place", "learned-sets", "care")
+DRAWN = (
+    "care-aimed",
+    "care-sector",
+    "care-sightlines",
+    "after-ancha",
+    "tuned-place",
+    "learned-sets",
+    "care",
+)
 """The policies of the figure, without parameters."""
 COMMAND = "python docs/b90_results.py --recorded nuscenes:DATA argoverse2:DATA kitti:DATA boreas"
 WHOLE = "care-sector"

@@ -112,6 +112,7 @@ _COLOURS = {
     "care-sightlines": "#9B59D0",
     "care-spread": "#5B82C2",
     "care-sector": "#C2478A",
+    "care-aimed": "#D9622B",
     "boxes": "#B3543C",
     "tuned-place": "#1FA2A6",
     "after-ancha": "#7A7A3C",

@@ -60,6 +60,7 @@ REFERENCE_ENTRIES = (
     Entry("care-sector"),
     Entry("care-sector", (("residual", False),)),
     Entry("care-sightlines"),
+    Entry("care-aimed"),
     Entry("learned-sets"),
     Entry("care", cell_order="core-spread"),
     Entry("care"),
