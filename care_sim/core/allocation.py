@@ -196,10 +196,10 @@ def allocate(
 
     Exploitation sets fill at most round((1 - rho) B) cells, round-robin. Then each reserve layer in
     order fills up to B, round-robin. Then `floor`, a permutation of all cells, fills up to B; None
-    leaves the rest unspent. Within a set, cells are taken in its own order
-    (`care_sim.core.cells.order`), and a cell that is already taken costs the set no turn. rho = 0
-    keeps no reserve: layers then take only what exploitation leaves. Raises InvalidInput for
-    another form of demand or floor.
+    leaves the rest unspent. The allocator takes the cells of a set in the order of the set
+    (`care_sim.core.cells.order`). A cell that is already taken costs the set no turn. rho = 0 keeps
+    no reserve: layers then take only what exploitation leaves. Raises InvalidInput for another form
+    of demand or floor.
     """
     check_number("reserve_fraction", reserve_fraction, 0, 1)
     check_whole("budget", budget, 0, HIGHEST_CELL)

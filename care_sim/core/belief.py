@@ -23,9 +23,9 @@ of a known class."""
 def read_rows(
     tables: NDArray[np.floating], wanted: Mask, label: int, labels: int, highest: float
 ) -> tuple[Floats, Integers, int]:
-    """The rows (n, k) of those of the tables (W, m, k) that are `wanted` (W,) which do not begin
-    with -1, which is padding, table after table; how many there are of each (W,); and whether they
-    are `SOUND`.
+    """Return the rows (n, k) of the `wanted` (W,) tables (W, m, k), table after table. Rows that
+    begin with -1 are padding and are left out. Also return the number of rows per table (W,) and
+    the verdict, such as `SOUND`.
 
     Numbers go up to `highest`. Rows begin with a whole number of 0 or more, and have a class below
     `labels` in the column `label`.

@@ -222,8 +222,8 @@ class CameraFaults:
     """Age of the camera's detections in whole keyframes."""
     camera_latency_s: float = bounded(0.0, 0, LONGEST_LATENCY_S)
     """Age of the camera's detections in seconds; not together with `camera_latency`. The picture is
-    of that instant, or of the newest before it at which there is one: in the closed loop the world
-    steps every 0.05 s, a film has its keyframes (`care_sim.sensors.camera`).
+    of that instant, or of the newest earlier one that has a picture. The closed loop has one per
+    step of 0.05 s, a film one per keyframe (`care_sim.sensors.camera`).
     """
     camera_jitter: int = bounded(0, 0, MOST_KEYFRAMES)
     """Most keyframes by which a picture may come later still; drawn evenly from 0 to this."""
@@ -309,15 +309,15 @@ class Sensing(CameraFaults, LidarFaults, ReturnSettings):
     leading car that brakes (`results/detectors.md`).
     """
     sweep_mask: str = one_of(BEFORE, SWEEP_MASKS)
-    """Which cells the sweeps between two keyframes fire, of a film that has them: those of the mask
-    `before`, the only one that was chosen then, or those of the `coming` keyframe, as where all
-    sweeps of a keyframe are masked alike.
+    """Mask of the sweeps between two keyframes, in a film that has sweeps. `before` fires the cells
+    of the last keyframe, the only mask chosen by then. `coming` fires those of the next keyframe,
+    as if one mask covered all sweeps of a keyframe.
     """
     clutter: bool = False
-    """Whether a generated street is less clean: kerbs, verges, vegetation, poles, uneven fronts,
-    bicycles in racks and people in groups (`care_sim.streets.clutter`), a road that slopes, and
-    returns that are lost and err as in recorded sweeps (`care_sim.sensors.recorded_errors`). Films
-    of streets alone have it.
+    """Whether a generated street is less clean; only films of streets have this. It adds kerbs,
+    verges, vegetation, poles, uneven fronts, bicycles in racks and people in groups
+    (`care_sim.streets.clutter`). The road slopes, and returns are lost and err as in recorded
+    sweeps (`care_sim.sensors.recorded_errors`).
     """
     camera_confidence: float = bounded(CAMERA_CONFIDENCE, 0, 1)
     """Least confidence of a camera detection, 0 to 1; visible pixels decide, and the least box has
@@ -412,8 +412,8 @@ COLUMNS_WHERE_CHANGED = (
     "clutter",
     "velocity_keyframes",
 )
-"""Conditions that are a column of results only where they are not the default: so rows, and the
-digests made of them, stay as they were before there was a choice."""
+"""Conditions that become a column of results only if they differ from the default. Rows and their
+digests therefore stay as they were before the condition existed."""
 CAMERA_FAULTS = tuple(field.name for field in fields(CameraFaults))
 UNUSED_BY_FULL_SCAN = (
     *CAMERA_FAULTS,

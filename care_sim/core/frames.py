@@ -24,8 +24,9 @@ _Number = TypeVar("_Number", float, Floats)
 def mounted_at(
     place: tuple[_Number, _Number], turn: tuple[_Number, _Number], at: tuple[float, float, float]
 ) -> tuple[_Number, _Number]:
-    """World x and y of what is mounted `at` (x, y, z) in the frame of a body at a `place` on the
-    ground; `turn` is the cosine and the sine of its yaw. For one body, or for many as columns.
+    """Return world x and y of a thing mounted `at` (x, y, z) in the frame of a body. The body is at
+    a `place` on the ground, and `turn` is the cosine and the sine of its yaw. Takes one body, or
+    many as columns.
     """
     (x, y), (cos, sin), (ahead, left, _) = place, turn, at
     return x + (cos * ahead - sin * left), y + (sin * ahead + cos * left)
@@ -68,9 +69,9 @@ yaw.
 
 @dataclass(frozen=True)
 class Frame:
-    """Origin (world x, y, z in metres) and orientation of a frame: turned by `yaw` about z, then by
-    `pitch` about its own y, which lowers its front, then by `roll` about its own x, which lowers
-    its right (radians; ISO 8855).
+    """Origin (world x, y, z in metres) and orientation of a frame (radians; ISO 8855). The frame
+    turns by `yaw` about z, then by `pitch` about its own y, which lowers its front. Last it turns
+    by `roll` about its own x, which lowers its right.
     """
 
     x: float

@@ -2,9 +2,9 @@
 
 Frame: sensor frame, x forward, y left, z up; metres and radians. A cell's index is `row * columns +
 column`; row 0 is the highest elevation and column c covers the azimuths [right + c * width, right +
-(c + 1) * width). All round the car, which is the default, `right` is -pi. Azimuths and elevations
-are about the grid's own axes, which the sensor frame has, too, unless the LiDAR is tilted to the
-car; directions, boxes and rays are in the sensor frame.
+(c + 1) * width). All round the car, which is the default, `right` is -pi. Directions, boxes and
+rays are in the sensor frame. Azimuths and elevations are about the grid's own axes, which are those
+of the sensor frame unless the LiDAR is tilted to the car.
 """
 
 from dataclasses import fields, replace
@@ -34,13 +34,13 @@ Place = tuple[float, float, float]
 """x, y and z in metres."""
 
 AT_LIDAR_M = 1.5
-"""A camera within this of a LiDAR is taken to stand at it, as the paper's wedges do without a word
-on it: the six of nuScenes are 0.5 to 1.0 m from LIDAR_TOP."""
+"""A camera within this distance of a LiDAR counts as being at the LiDAR. The paper's wedges assume
+this silently. The six cameras of nuScenes are 0.5 to 1.0 m from LIDAR_TOP."""
 LEAST_DEPTH_M = 5.0
 """The wedges of a camera farther from a LiDAR begin at this depth along its optical axis, so that
 beside the middle of a picture they begin farther away. A car needs 4.3 m to stop from 30 km/h at 8
-m/s^2: an object first seen nearer is too late for any LiDAR, and every metre less widens the wedges
-of all that is farther."""
+m/s^2. An object first seen nearer is therefore too late for any LiDAR. Every metre less would widen
+the wedges of all that is farther."""
 _ORIGIN = np.zeros(3)
 _ORIGIN.flags.writeable = False
 
@@ -234,8 +234,8 @@ class AngularGrid(GridRays, HeadCells):
         The first ray of a bundle is its middle; the others lie within half a turn of it. `starts`
         (n, 3) is where the rays of each start, if not at the LiDAR. Starts within `AT_LIDAR_M` of
         it count as rays of its own. Elsewhere, the four rays behind the middle are the corners of
-        an image box, one unit of depth long: their rectangle holds all that they enclose, seen from
-        the LiDAR, from `LEAST_DEPTH_M` on and as far as it reaches.
+        an image box, one unit of depth long. Their rectangle holds all that they enclose, seen from
+        the LiDAR, from `LEAST_DEPTH_M` to the LiDAR's reach.
         """
         bundles = np.asarray(bundles, dtype=float)
         if not len(bundles):

@@ -349,8 +349,8 @@ class PinholeCamera:
         return box_spans(np.ascontiguousarray(boxes, dtype=float), self._model, NEAR_M)
 
     def window_on(self, boxes: Floats) -> tuple[int, int, int, int]:
-        """Left, top, right and bottom in whole pixels: the rectangle of the picture that holds 3D
-        boxes (n, 7), with a pixel more on each side; all 0 when none is in view.
+        """Return the rectangle of the picture that holds 3D boxes (n, 7), with a pixel more on each
+        side. It is left, top, right and bottom in whole pixels, all 0 if no box is in view.
         """
         boxes = np.ascontiguousarray(boxes, dtype=float)
         window: tuple[int, int, int, int] = window_on(

@@ -119,8 +119,9 @@ def ray_starts(detections: ImageDetections, rig: Rig) -> Floats | None:
 
 
 def _turned_since(vectors: Floats, detections: ImageDetections) -> Floats:
-    """Vectors (n, k, 3) of the sensor frames in which the pictures were taken, along the axes of
-    now: since then the car has turned, so they have turned the other way.
+    """Return vectors (n, k, 3) along the axes of the present sensor frame. `vectors` are in the
+    sensor frames at which the pictures were taken. The car has turned since, so the vectors turn
+    the other way.
     """
     return turned(vectors, -detections.yaw_changes[:, None])
 

@@ -252,9 +252,10 @@ class Demand:
     layers: Sequence[Sequence[Cells]] = ()
     """The reserve layers in order of priority, each a sequence of sets of cells."""
     shots: Integers | None = None
-    """(N,) how often at least every cell of the grid is to be fired if it is taken, of hardware
-    that may fire one more than once (`care_sim.core.firing.base`); None for once. The allocator
-    counts cells; the hardware deals the shots, no more than the budget, and what is left on top.
+    """(N,) least number of shots at each cell of the grid, if the cell is taken; None for one. Only
+    hardware that may fire a cell more than once reads it (`care_sim.core.firing.base`). The
+    allocator counts cells. The hardware deals the shots, no more than the budget, and what is left
+    on top.
     """
 
 

@@ -215,9 +215,9 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
         """Fire the cells that `action` scores highest and advance to the next keyframe.
 
-        Raises InvalidInput for an action of the wrong shape or with values that are not finite, and
-        gymnasium.error.ResetNeeded before `reset`, after the end, and after an error or interrupt
-        in the middle of a step.
+        Raises InvalidInput for an action of the wrong shape or with values that are not finite.
+        Raises gymnasium.error.ResetNeeded before `reset`, after the end, and after an error or
+        interrupt in the middle of a step.
         """
         loop, worlds = self.loop, self._worlds
         scores = self._taken(action)

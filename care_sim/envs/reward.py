@@ -45,10 +45,10 @@ def weights(changes: Mapping[str, float] | None) -> dict[str, float]:
 
 
 BEGINNING = (0.0, 0.0, math.nan, 0.0)
-"""State of the reward before the first keyframe of an episode: whether the first-sighting
-actor has been in view and detected at any keyframe; the full-scan bound, which is the distance at
-the first keyframe at which a scan of every cell would have detected the actor, NaN while there was
-none; and the share of the bound that is lost.
+"""State of the reward before the first keyframe of an episode. The first two numbers say whether
+the first-sighting actor has been in view, and has been detected, at any keyframe. The third is the
+full-scan bound, NaN until there is one. A scan of every cell would have detected the actor first at
+this distance. The fourth is the share of the bound that is lost.
 """
 BOUND = 2
 """The place of the full-scan bound in it."""
@@ -65,13 +65,13 @@ class Rewards:
     | `braking` | -1 while the brake is on before it is in view | 0 down to -(keyframes before) |
     | `gain` | -(share lost) | first-detection distance over the full-scan bound, less 1: 0 to -1 |
 
-    Each is at most 0; with weights of 0 or more the best return is 0. Where a full scan too is
-    late, as the first rays that return lag behind the first pixels in view, `delay` stays below 0;
-    `gain` reaches 0 there, but for faults of the LiDAR, which the bound does not know.
+    Each is at most 0; with weights of 0 or more the best return is 0. A full scan can be late too,
+    because the first rays that return lag behind the first pixels in view. Then `delay` stays below
+    0, while `gain` reaches 0, except for faults of the LiDAR, which the bound ignores.
 
     From the bound on, while the actor is undetected, 1 - distance / bound is lost, and at the end
     of an episode without a detection everything. This potential never falls, and `gain` is its
-    difference from keyframe to keyframe (Ng, Harada and Russell 1999, with a discount of 1): the
+    difference from keyframe to keyframe (Ng, Harada and Russell 1999, with a discount of 1). The
     differences sum to the metric itself, however they are spread over the episode. A learner that
     discounts more weighs early losses more.
     """
@@ -124,10 +124,10 @@ def _earn(who: Mask, courses: Floats, told: Floats, measured: bool, table: Float
     """Fill the `table` (5, W) with the terms of the worlds `who`, in the order of `REWARD_WEIGHTS`,
     and lead their `courses` (4, W) on, each as `BEGINNING`.
 
-    The rows of `told` (8, W) are `in_view`, `detected`, `braking`, `distance_m`, `clearance_m` and
-    `impact_speed_mps` as in `care_sim.loops.records.Records`; whether a scan of every cell would
-    detect the actor; and whether the episode ends with this keyframe. `measured` says whether the
-    bound is, on which `gain` depends.
+    The first six rows of `told` (8, W) are as in `care_sim.loops.records.Records`: `in_view`,
+    `detected`, `braking`, `distance_m`, `clearance_m` and `impact_speed_mps`. The last two say
+    whether a scan of every cell would detect the actor, and whether the episode ends with this
+    keyframe. `measured` says whether the bound, on which `gain` depends, is measured.
     """
     for w in range(len(who)):
         if not who[w]:

@@ -87,9 +87,9 @@ class History:
 
 
 class Stepped(NamedTuple):
-    """Result of a step of n worlds: rewards, terminations and truncations (n,), 0 and False of
-    those that did not play; what `info` says of all in `columns` (n, ...), by name, which the next
-    step may write over; and what it says of one alone in `single`, by world.
+    """Result of a step of n worlds. Rewards, terminations and truncations (n,) are 0 and False for
+    worlds that did not play. `columns` (n, ...) hold the part of `info` that all worlds have, by
+    name; the next step may write over them. `single` holds the part of one world alone, by world.
     """
 
     rewards: Floats
@@ -105,8 +105,8 @@ class Worlds:
     keyframe into its row of `observed`.
 
     Unless `exact`, clearances that no reward needs are bounds (`Loop`); outcomes are exact.
-    `one_budget` says whether all worlds of the vector environment, those of other threads too, fire
-    equally many cells: infos then hold them as one array, else as one for each world.
+    `one_budget` says whether all worlds of the vector environment, in all threads, fire equally
+    many cells. Infos then hold the cells as one array, else as one array per world.
     """
 
     records: Records

@@ -23,8 +23,8 @@ alone. With less, false boxes would fall on what is there so often that those wh
 be known by their places.
 """
 APART_S = 3.0
-"""A film's own boxes become false ones this long before and after they were true: at 30 km/h what
-stands is 25 m nearer by then, and what was 20 m away is passed.
+"""A film's own boxes become false ones this long before and after they were true. At 30 km/h a
+standing object is 25 m nearer by then, and the car has passed one that was 20 m away.
 """
 
 
@@ -39,9 +39,9 @@ def pool_of_another_drive(
     """Drive through `world`, every cell fired, and close it: return the camera's boxes before
     misses and delay.
 
-    The car brakes as a full scan in clear air makes it brake, every pulse a plain ray, whatever the
-    policy and the returns of the episode: all of them meet the same false boxes. The true boxes of
-    a car that hardly brakes differ a little from them.
+    The car brakes as a full scan in clear air makes it brake, every pulse a plain ray. Episodes
+    with any policy and any returns therefore meet the same false boxes. The true boxes of a car
+    that hardly brakes differ a little from them.
 
     With the `seeds` of an episode its mount errs as the episode's does: false boxes of a straight
     camera would be known among those of a crooked one.

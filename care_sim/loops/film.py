@@ -49,9 +49,9 @@ class Shot:
 @dataclass(frozen=True, eq=False)
 class Film:
     """A scene: its name, the cameras of its car, the LiDAR's height above the road, seconds between
-    keyframes, the grid whose cells its clouds hold, the `place` (x, y) of the LiDAR, of several the
-    first, on the car, the default one where a recording lacks it, and the settings of the `returns`
-    that its clouds hold.
+    keyframes, and the grid of its clouds. `place` (x, y) is the place of the first LiDAR on the
+    car, or the default where a recording lacks it. `returns` are the settings of the returns in its
+    clouds.
 
     `hidden` are the objects that its source annotates at the first keyframe though no return and no
     pixel shows them there. No shot annotates them, so nobody has to find them; they were present

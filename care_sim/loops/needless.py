@@ -1,8 +1,8 @@
 """Needless braking, judged by the truth.
 
-A keyframe with the brake on is needless if no body, reported or not, lies in the strip ahead that
-the controller guards, nor would enter it within the controller's horizon if it kept its velocity.
-The time for which the controller waits until it lets go does not count.
+The controller guards a strip ahead. A keyframe with the brake on is needless if no body, reported
+or not, is in this strip or would enter it within the controller's horizon at constant velocity. The
+time for which the controller waits until it lets go does not count.
 
 A brake for what a detector made up is unfounded: it is needless, and no track in the strip touches
 a body, reported or not. A detector that misjudges the speed or size of a real body has invented
@@ -80,9 +80,10 @@ class UnfoundedBraking(NeedlessBraking):
         in_view: bool,
         behind: Integers,
     ) -> bool:
-        """Whether it is; to be asked at every keyframe. `tracks` are in the frame of the sensor,
-        and the same lie `ahead` as the driver takes them; `behind` (n,) are the bodies behind the
-        detections, and `in_view` says whether a camera shows the first-sighting actor.
+        """Return whether the braking is needless; call this at every keyframe. `tracks` are in the
+        sensor frame, and `ahead` are the same tracks as the driver takes them. `behind` (n,) are
+        the bodies behind the detections. `in_view` says whether a camera shows the first-sighting
+        actor.
         """
         target = world.first_sighting
         self._has_met |= in_view or (target is not None and target.body in behind)

@@ -36,9 +36,9 @@ class OpenLoopKeyframe:
     """The record of one keyframe of the open loop: what was fired, and what the detector made of
     the returns.
 
-    `detections` became tracks; `reported` are these and what was too unsure. `velocities` (n, 2)
-    are those that the detector reported, or without them those of the tracks, over ground, in
-    sensor axes; 0 for a track that has just begun and for what became none.
+    `detections` became tracks; `reported` are these and what was too unsure. `velocities` (n, 2),
+    over ground, in sensor axes, are the detector's, or without these the tracks'. They are 0 for a
+    track that has just begun and for a detection that became none.
     """
 
     index: int
@@ -193,9 +193,9 @@ class OpenLoop:
         self.belief = self._limits.belief(ego, self._arrived.detections, tracks, ranges)
 
     def _boxes(self, shot: Shot) -> Floats:
-        """(n, 7) sensor-frame boxes of every object of the film, 0 of those that are not annotated
-        now: else their distance would begin a burst of misses while they are away, and their
-        appearance would fall into it.
+        """Return sensor-frame boxes (n, 7) of every object of the film, 0 for objects that are not
+        annotated now. Otherwise the distance of an absent object would begin a burst of misses, and
+        its appearance would fall into this burst.
         """
         boxes = np.zeros((len(self._rows), 7))
         rows = [self._rows[number] for number in shot.annotations.objects.tolist()]

@@ -23,9 +23,9 @@ Told = dict[str, Floats]
 def told_by(
     fired: Cells, cells: Cells, intensities: Floats | None = None, times_s: Floats | None = None
 ) -> Told:
-    """The columns (k,) of returns of ascending `cells` (k,) as numbers of the `fired` ones,
-    ascending too: of several returns of a cell the first, of a cell fired several times the same
-    for each. Columns that are None are left out.
+    """Return columns (k,) of returns of `cells` (k,) as numbers per `fired` cell. Both kinds of
+    cells ascend. The first of several returns of a cell counts, and each shot at a cell gets the
+    same number. Columns that are None are left out.
     """
     if intensities is None and times_s is None:
         return {}

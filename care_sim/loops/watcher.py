@@ -74,8 +74,8 @@ class TrueSituation:
     ego: Floats
     """(7,) the box of the car."""
     way: Floats
-    """(n, 3) world poses on the car's way, the middles of n equal pieces of `WAY_M` metres from the
-    sensor on; one piece where no route bends it, none in the open loop.
+    """(n, 3) world poses on the car's way: the middles of n equal pieces of `WAY_M` metres from the
+    sensor on. It has one piece where no route bends the way, and none in the open loop.
     """
     names: tuple[str, ...]
     """(n,) of all actors, or of the annotated objects."""

@@ -74,7 +74,7 @@ def parts_table(results: Sequence[BudgetResult]) -> Table:
 
 def ideas_table(whole: BudgetResult, without: Mapping[str, BudgetResult]) -> Table:
     """Return a table with a line per idea that a policy plays `without`, the one that costs most
-    cells first: B90, and its ratio to the `whole` policy's over all parts and on each.
+    cells first. A line has B90, and its ratio to the `whole` policy's over all parts and on each.
     """
     dearest_first = sorted(without, key=lambda idea: -without[idea].score.budget)
     rows = [

@@ -13,10 +13,10 @@ An early data sheet of Ouster's OS1 (scribd.com, document 672435817) states 40 m
 
 A receiver adds up the photons of n shots at a cell (Ouster, US 2023/0243975 A1; AEye,
 RRRWP_19_0812, for several shots at one point). A receiver that is limited by its own photons needs
-a fixed count, so it needs an nth of the power: the left side counts n times, and in clear air the
-range grows with the square root of n. In sunlight the signal to noise grows with the root of the
-shots (Vaisala, CL61 user guide M212475EN), so the range grows with the fourth root of n. Pile-up
-(Gupta et al. 2019, Photon-Flooded Single-Photon 3D Cameras) is left out.
+a fixed count, so it needs an nth of the power. The left side therefore counts n times, and in clear
+air the range grows with the square root of n. In sunlight the signal to noise grows with the root
+of the shots (Vaisala, CL61 user guide M212475EN), so the range grows with the fourth root of n.
+Pile-up (Gupta et al. 2019, Photon-Flooded Single-Photon 3D Cameras) is left out.
 
 The error of a mean falls with the root of n, which is computed. Wu et al. 2025 (Sensors 25, 6184)
 disagree: where the clock limits, the error can fall with n.

@@ -1,5 +1,5 @@
-"""Boxes (n, 7): centre x, y, z, length, width, height, yaw; the azimuths and elevations that bound
-their hulls, and the cells of the dilated rectangles that hold these (paper, Remark 2).
+"""Azimuths and elevations that bound the hulls of boxes, and the cells of the dilated rectangles
+around them (paper, Remark 2). Boxes (n, 7) are centre x, y, z, length, width, height, yaw.
 
 The sensor frame is level, so that boxes in it stand upright, whatever the tilt of the grid. Where
 the grid is tilted, the corners of the boxes are measured along its axes.
@@ -45,8 +45,8 @@ def half_extents(boxes: Floats) -> tuple[Floats, Floats]:
 
 
 Bounds = tuple[Floats, Floats, Mask]
-"""(n, j) azimuths of every box, that of its centre first; (n, k) elevations; (n,) whether it stands
-around the axis about which azimuths are counted, and so covers every column."""
+"""Bounds of n boxes: azimuths (n, j), the centre's first; elevations (n, k); and whether the box
+surrounds the axis (n,). Azimuths are counted about this axis, so such a box covers every column."""
 
 
 def level_bounds(boxes: Floats) -> Bounds:
@@ -69,8 +69,8 @@ def tilted_bounds(boxes: Floats, axes: Floats) -> Bounds:
 
 
 def corner_bounds(centres: Floats, corners: Floats) -> Bounds:
-    """The bounds of convex bodies with `corners` (n, 8, 3), joined as those of a box, and points
-    `centres` (n, 3) in their midst, all along the axes of the grid.
+    """Return the bounds of convex bodies with `corners` (n, 8, 3) and inner points `centres` (n,
+    3), along the axes of the grid. Edges join the corners as in a box.
     """
     points = np.concatenate([centres[:, None], corners], axis=1)
     azimuths = np.arctan2(points[..., 1], points[..., 0])
@@ -148,10 +148,10 @@ def silhouettes(boxes: Floats) -> tuple[Floats, Floats, Mask]:
 
 
 class GridSpacing(NamedTuple):
-    """The numbers of a grid that give the cell of a direction: its numbers of `columns` and `rows`,
-    the `column_width` and `row_height` in radians, the elevation `top` of row 0, the azimuth
-    `right` at which column 0 begins, how many columns a whole `turn` would have, and the
-    `elevations` (rows,) of rows that are not equally spaced, else (0,).
+    """Numbers of a grid from which the cell of a direction follows; angles are in radians. The grid
+    has `columns` of `column_width` and `rows` of `row_height`. Row 0 has the elevation `top`, and
+    column 0 begins at the azimuth `right`. `turn` is the number of columns that a whole turn would
+    have. `elevations` (rows,) lists rows that are not equally spaced, else it is (0,).
     """
 
     columns: int
@@ -205,9 +205,9 @@ def rectangle_cells(
     """The cells of n rectangles, each ascending, and their sizes, as in
     `care_sim.core.cells.sets.CellSets`.
 
-    A rectangle holds the `azimuths` (n, j) of its row, which lie within half a turn of the first,
-    and the `elevations` (n, k), dilated by `azimuth_margins` (n,) columns and `elevation_margin`
-    rows.
+    A rectangle holds the `azimuths` (n, j) and the `elevations` (n, k) of its row. It is dilated by
+    `azimuth_margins` (n,) columns and `elevation_margin` rows. Azimuths are within half a turn of
+    the first.
     """
     # Edges first, so that the table of cells is made once and of the right size. A rectangle that
     # misses the grid has no rows, and its cells end where they begin.

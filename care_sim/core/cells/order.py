@@ -31,10 +31,10 @@ COLUMN_STEP = round(math.sqrt(2) * _TURN) % _TURN | 1
 ROW_STEP = round(math.sqrt(3) * _TURN) % _TURN | 1
 """Steps of the sequence per column and per row, in parts of `_TURN`: the square roots of the first
 primes, modulo 1 (Richtmyer, 1951). Whole numbers give every machine the same order, and odd ones
-give different cells of a grid different numbers. Over eight rectangles of 4 x 6 to 10 x 40 cells
-the most uneven of all windows at a corner, at any number of cells taken, is off by 2.0 cells on
-average; 2.5 to 3.0 with the inverse powers of the plastic number, 2.6 to 3.3 with the golden ratio
-and another number, 5.5 at random.
+give different cells of a grid different numbers. Evenness was measured over eight rectangles of 4 x
+6 to 10 x 40 cells. The most uneven of all windows at a corner, at any number of cells taken, is off
+by 2.0 cells on average. Inverse powers of the plastic number give 2.5 to 3.0, the golden ratio and
+another number 2.6 to 3.3, a random order 5.5.
 """
 
 
@@ -305,8 +305,8 @@ def reordered(
     """The same sets, the cells of each listed in an `order` of `care_sim.core.defaults.CELL_ORDERS`
     but the first; only the first `most` of each, if it is given.
 
-    A set lies on an arc of columns: from its first to its last, or, if it has cells on both sides
-    of the seam at azimuth -pi, from the end of its widest gap. `columns` and the spread orders
+    A set covers an arc of columns, from its first to its last. With cells on both sides of the seam
+    at azimuth -pi, the arc begins at the end of its widest gap. `columns` and the spread orders
     count from the right end of the arc, so that the seam makes no difference. A set of several
     LiDARs has an arc for each, and a core: `columns` and the spread orders go through all of them
     at a time. Raises InvalidInput for another order, and for a cell that the grid does not have.

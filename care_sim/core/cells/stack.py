@@ -1,8 +1,8 @@
 """The grids of several LiDARs as one, rows under rows: arrays of cells stay (rows, columns).
 
 Every LiDAR looks from its own place, and along the axes of the sensor frame, which is that of the
-first one. A cell is numbered as in a plain grid, `row * columns + column`; the rows are those of
-the first LiDAR from its top to its bottom, then those of the second, and so on.
+first one. A cell is numbered as in a plain grid, `row * columns + column`. Rows are the first
+LiDAR's from top to bottom, then the second's, and so on.
 """
 
 from collections.abc import Callable

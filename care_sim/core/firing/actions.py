@@ -24,9 +24,9 @@ NOT_FIRED, EXPLOITATION, RESERVE, FLOOR, CHOSEN, ALONG = range(len(SHARES))
 
 
 def scores_of(cells: Cells, shape: tuple[int, int], shots: Integers | int = 1) -> Action:
-    """The action (E, A) that demands `cells` (n,); the earlier, the higher. Hardware that may fire
-    cells more than once (`care_sim.core.firing.base`) fires each `shots` (n,) times at least, as
-    far as their sum does not exceed the budget; the rest is added on top.
+    """The action (E, A) that demands `cells` (n,); the earlier, the higher. Some hardware may fire
+    cells more than once (`care_sim.core.firing.base`). It fires each cell at least `shots` (n,)
+    times, as far as their sum does not exceed the budget. The rest is added on top.
 
     An action is float32. It keeps the order of 2^23 cells of one shot, and of 2^23 / (m (m + 1)) of
     up to m shots; among more, neighbours may tie.

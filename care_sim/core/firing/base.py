@@ -23,11 +23,11 @@ from care_sim.core.grid import Cells
 class Hardware(ABC):
     """The cells of a `grid` in units that fire as a whole, `unit_cells` cells each.
 
-    The budget is paid in units. Subclasses name what they stand for: `name` as `firing` has it, the
-    `numbers` behind the colon of it, if any, with their `usual` values, the `unit` in one word, the
-    `product`, and its public `source`. `spends_floor` says whether the random floor gets what is
-    left of the budget. `most_shots` is how often a cell may be fired at a keyframe, and
-    `counted`, in one word, what the budget B is a number of.
+    The budget is paid in units. Subclasses state the `name` as in `firing`, the `unit` in one word,
+    the `product`, and its public `source`. `numbers` are the settings after the colon of `firing`,
+    if any, with their `usual` values. `spends_floor` says whether the random floor gets what is
+    left of the budget. `most_shots` is how often a cell may be fired at a keyframe, and `counted`,
+    in one word, what the budget B is a number of.
     """
 
     name: ClassVar[str]
@@ -109,8 +109,9 @@ def demanded(scores: NDArray[Any]) -> Cells:
 
 
 def shots_by_cell(fired: Cells, size: int) -> tuple[Cells, Integers | None]:
-    """The cells (n,) of what `fired`, ascending, each once, and (size,) how often each cell of a
-    grid of that size fires; None where none fires more than once, as with all but one hardware.
+    """Return the distinct cells (n,) of `fired`, ascending, and the number of shots per cell
+    (size,) of a grid of that size. The number is None if no cell fires more than once, as with all
+    but one hardware.
     """
     again = fired[1:] == fired[:-1]
     # Asked at every keyframe of every hardware: a count of all cells would take much longer.

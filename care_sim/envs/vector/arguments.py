@@ -134,9 +134,9 @@ def joined(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def kept(columns: dict[str, Any], who: Mask) -> dict[str, Any]:
-    """Infos in the form of Gymnasium: of `columns` (W, ...), or dictionaries of them, the rows of
-    the worlds `who` (W,), 0 or None of the others; and beside every name a mask of these worlds,
-    under the name with a leading underscore.
+    """Return infos in the form of Gymnasium, from `columns` (W, ...) or dictionaries of them. Rows
+    of the worlds `who` (W,) stay; other rows are 0 or None. Beside every name is a mask of these
+    worlds, under the name with a leading underscore.
     """
     infos = dict[str, Any]()
     for name, column in columns.items():

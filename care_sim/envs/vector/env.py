@@ -224,9 +224,9 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
     def step(self, actions: Action) -> tuple[Observed, Floats, Mask, Mask, dict[str, Any]]:
         """Fire the cells that each world's row of `actions` (W, E, A) scores highest.
 
-        Raises InvalidInput for actions of the wrong shape or with values that are not finite, and
-        gymnasium.error.ResetNeeded before `reset`, after an error or interrupt in the middle of a
-        step, and for a world that is over in the mode "Disabled".
+        Raises InvalidInput for actions of the wrong shape or with values that are not finite.
+        Raises gymnasium.error.ResetNeeded before `reset`, after an error or interrupt in the middle
+        of a step, and for a world that is over in the mode "Disabled".
         """
         self._check_open()
         if not self._begun.all():

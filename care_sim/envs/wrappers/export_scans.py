@@ -50,26 +50,26 @@ class ExportScans(Watching):
     The first episode goes to the folder `path`, later ones to `NAME-1`, `NAME-2` beside it. Metres,
     seconds, radians; boxes are centre x, y, z, length, width, height, yaw.
 
-    - `000.pcd`, binary: the returns of keyframe 0 as `x y z` (float32, sensor frame: x forward,
-      y left, z up), `cell` (int32, row * columns + column) and `share` (uint8, an index into the
-      `shares` of `episode.json`).
-    - `000.json`: `keyframe`, `time_s`, `sensor_in_world` (x, y, z, yaw, pitch, roll), `ego` (box),
-      `bodies` (`name`, `class` or null, `box`), all in the world frame (x along the road, y left,
-      z up; in the open loop as its source has it) and truth;
-      `tracks` (`id`, `class`, `box` of the forecast, `velocity` over ground) in the sensor frame;
-      `fired` cells, each as often as it was. In the closed loop `detected` (the first-sighting
-      actor), `braking`, `speed_mps`. In the open loop bodies are the annotated objects, each with
-      `found` by this keyframe, `scored` (within range) and `appearing` (its first sighting).
+    - `000.pcd`, binary: the returns of keyframe 0. Fields are `x y z` (float32, sensor frame: x
+      forward, y left, z up), `cell` (int32, row * columns + column) and `share` (uint8, an index
+      into the `shares` of `episode.json`).
+    - `000.json`: `keyframe` and `time_s`. The truth in the world frame: `sensor_in_world` (x, y, z,
+      yaw, pitch, roll), `ego` (box), `bodies` (`name`, `class` or null, `box`). In this frame x is
+      along the road, y left, z up; in the open loop it is the source's. In the sensor frame are
+      `tracks` (`id`, `class`, `box` of the forecast, `velocity` over ground). Cells that fired are
+      in `fired`, each once per shot. The closed loop adds `detected` (the first-sighting actor),
+      `braking`, `speed_mps`. In the open loop bodies are the annotated objects, each with `found`
+      by this keyframe, `scored` (within range) and `appearing` (its first sighting).
     - `episode.json`: `units`, `grid`, `classes`, `shares`, and `outcome`, null until the end.
 
-    A point lies on the middle ray of its cell, at the range that the policy was shown: of a
-    recording, whose points lie anywhere in their cells, the nearest of each.
+    A point is on the middle ray of its cell, at the range that the policy was shown. Points of a
+    recording are anywhere in their cells, and the file holds the nearest of each cell.
 
     ### Arguments
     `path` of the folder, one for every environment of a vector; `policy`, the `care_sim.Policy`
-    that acts, as for `RecordRerun`. Raises `care_sim.MissingExtra` without the extra `open3d`,
-    `care_sim.InvalidInput` for an environment that is no loop of CARE-Sim and for a folder that
-    holds scans already, OSError where nothing can be written.
+    that acts, as for `RecordRerun`. Raises `care_sim.MissingExtra` without the extra `open3d`.
+    Raises `care_sim.InvalidInput` for an environment that is no loop of CARE-Sim and for a folder
+    that already holds scans. Raises OSError if the folder cannot be written.
 
     ### Example
     ```python

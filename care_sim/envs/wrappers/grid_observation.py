@@ -61,7 +61,7 @@ class GridObservation(
     That of the wrapped environment.
 
     ### Arguments
-    `columns` (64) and `rows` (8) of blocks; each must divide the grid, 512 x 32: a block of 8 x 4
+    `columns` (64) and `rows` (8) of blocks; each must divide the grid, 512 x 32. A block of 8 x 4
     cells is 5.6 by 5.3 degrees, about the width of a person's wedge at 15 m. `pictures` (False)
     gives `grid` its three dimensions.
 
@@ -70,14 +70,15 @@ class GridObservation(
     wrapper must show an observation of the same form. `SectorReserve` and `SectorScores` may stand
     inside or outside.
 
-    Raises `care_sim.InvalidInput` for blocks that do not divide the grid, for an environment that
-    is none of CARE-Sim or that shows another form of observation, and for an observation that no
-    sensor can give.
+    Raises `care_sim.InvalidInput` for blocks that do not divide the grid and for an observation
+    that no sensor can give. Raises it also for an environment that is none of CARE-Sim or shows
+    another form of observation.
 
     ### Example
     ```python
     env = SectorReserve(gymnasium.make("CARE-Dense-v0", budget=0.03))
     env = GridObservation(env, pictures=True)
+
     observation, info = env.reset(seed=0)
     forecasts = observation["grid"][0]  # (8, 64), row 0 highest, column 0 straight behind
     observation["ego"]  # (4,) the car's own motion and the budget

@@ -167,9 +167,9 @@ class RecordRerun(Watching):
     measures. `care_sim.viewer.recording.entities.ENTITIES` lists each with unit and frame, and so
     does the page "About" of the recording. Timelines are `keyframe` and `seconds`.
 
-    Raises `care_sim.MissingExtra` without the extra `viewer`, `care_sim.InvalidInput` for an
-    environment that is no loop of CARE-Sim and for a file that is a folder or is being
-    written already, OSError where it cannot be written.
+    Raises `care_sim.MissingExtra` without the extra `viewer`. Raises `care_sim.InvalidInput` for an
+    environment that is no loop of CARE-Sim and for a file that is a folder or is already being
+    written. Raises OSError if the file cannot be written.
 
     ### Example
     ```python

@@ -54,8 +54,8 @@ class SectorReserve(_Sectors, ReadsBeliefs):
     | above 0 | a layer of the reserve; highest score first, ties by ascending index |
     | 0 or less | left to the floor |
 
-    The hulls of the forecasts, nearest first, take at most round((1 - rho) B) cells (Algorithm 1),
-    then sector after sector is fired whole, cells ascending, up to B, then the floor. Zeros
+    The hulls of the forecasts, nearest first, take at most round((1 - rho) B) cells (Algorithm 1).
+    Then sector after sector fires whole, cells ascending, up to B. The floor fires last. Zeros
     everywhere are the `history` policy, cell for cell.
 
     ### Observation
@@ -64,16 +64,17 @@ class SectorReserve(_Sectors, ReadsBeliefs):
     `GridObservation`, which shows no forecasts, they are those that its pictures were drawn of.
 
     ### Arguments
-    `azimuths` (32) and `elevations` (4), which must divide the grid, 512 x 32: a sector is 16 x 8
-    cells, 11.25 by 10.7 degrees; of the reserve of 3%, 148 cells, it takes 128.
+    `azimuths` (32) and `elevations` (4), which must divide the grid, 512 x 32. A sector is 16 x 8
+    cells, 11.25 by 10.7 degrees. A sector takes 128 of the 148 cells of the reserve at 3%.
 
-    Raises `care_sim.InvalidInput` for other numbers, for an action of another shape or with values
-    that are not finite, for an environment that is none of CARE-Sim or whose observation lacks the
-    forecasts.
+    Raises `care_sim.InvalidInput` for other numbers, and for an action of another shape or with
+    values that are not finite. Raises it also for an environment that is none of CARE-Sim or whose
+    observation lacks the forecasts.
 
     ### Example
     ```python
     env = SectorReserve(gymnasium.make("CARE-Dense-v0", budget=0.03))
+
     observation, info = env.reset(seed=0)
     scores = np.zeros(env.action_space.shape, np.float32)
     scores[1, 16] = 1.0  # one sector: just left of ahead, from level to 9 degrees down
@@ -183,6 +184,7 @@ class VectorSectorReserve(_VectorSectors, ReadsBeliefs):
     ### Example
     ```python
     env = VectorSectorReserve(gymnasium.make_vec("CARE-Dense-v0", num_envs=4, budget=0.03))
+
     observation, info = env.reset(seed=0)
     scores = np.zeros(env.action_space.shape, np.float32)  # (4, 4, 32)
     scores[:, 1, 16] = 1.0  # in every world the sector just left of ahead

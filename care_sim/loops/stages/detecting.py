@@ -25,9 +25,9 @@ from care_sim.world.world import World
 
 
 class Found(NamedTuple):
-    """Detections: `counts` (W,); `classes` (W, D); `boxes` (W, D, 7) in the frames of the sensors;
-    `objects` (W, D), the bodies behind them or NO_OBJECT; `tracks` (W, D), the ids that the track
-    memory gives them.
+    """Detections of W worlds: `counts` (W,), `classes` (W, D), and `boxes` (W, D, 7) in the sensor
+    frames. `objects` (W, D) are the bodies behind them or NO_OBJECT. `tracks` (W, D) are the ids
+    from the track memory.
     """
 
     counts: Integers
@@ -135,9 +135,9 @@ class _OneDetector:
         """Classes (n,), sensor-frame boxes (n, 7) and the body (n,) behind each detection or
         NO_OBJECT, of the returns of `bodies`; and (k,) all bodies that were found.
 
-        Found bodies are scored by the class-consistent 2 m match (paper, Remark 1), and only bodies
-        with returns in a box count: else a box on the end of a lorry would find a person hidden
-        behind it.
+        Found bodies are scored by the class-consistent 2 m match (paper, Remark 1). Only bodies
+        with returns in a box count. Otherwise a box on the end of a lorry would find a person
+        hidden behind it.
         """
         detector, sensor = self._detector, state.sensors.frame(world)
         objects = self._named[np.minimum(bodies, len(self._named) - 2)]
@@ -180,8 +180,9 @@ def _detect(
     targets: Integers,
     detected: Mask,
 ) -> None:
-    """Fill `found` with the reported bodies that at least so many of the returns `ids` (W, F) hit,
-    `counts` (W,) of them, and `detected` (W,) with whether these hold the one of the `targets`.
+    """Fill `found` with the reported bodies that at least `least` returns hit, and `detected` (W,)
+    with whether these bodies hold the target. `ids` (W, F) are the bodies of the returns, `counts`
+    (W,) of them in use.
     """
     for w in range(len(live)):
         if not live[w]:

@@ -95,8 +95,9 @@ class Driving:
     def ahead(
         self, state: State, tracks: tuple[Integers, Floats], also: Collection[int]
     ) -> dict[int, Ahead]:
-        """The tracks (W,) numbers of rows and rows (W, T, 13), in the frames of `state.driven`, of
-        the live worlds with another driver, a route or a plan, and of the worlds in `also`.
+        """Return tracks in the frames of `state.driven`, per live world with another driver, a
+        route or a plan, and per live world in `also`. `tracks` are the numbers of rows (W,) and the
+        rows (W, T, 13).
         """
         counts, rows = tracks
         found = {}

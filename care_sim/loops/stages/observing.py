@@ -96,8 +96,9 @@ def _put(
     table: NDArray[np.float32],
     who: Mask,
 ) -> Mask:
-    """Write `rows` (W, n, k) into the `table` (W, m, k) of the worlds `who`, and -1 before what is
-    left over; (W,) whether all were between `least` (k,) and `most` (c, k), and no more than m.
+    """Write `rows` (W, n, k) into the `table` (W, m, k) of the worlds `who`; each row left over
+    begins with -1. Return per world (W,) whether all numbers are between `least` (k,) and `most`
+    (c, k), and the rows at most m.
 
     Row by row `most` is that of the number in the column `camera`, or the only one.
     """

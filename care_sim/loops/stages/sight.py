@@ -1,9 +1,8 @@
 """The cameras of all worlds, and the detections that arrive.
 
-The pictures are those of the engine `fast` (`care_sim.sensors.engines.picture_kernels`), the
-detections those of an ideal camera (`care_sim.sensors.camera`): it may miss bodies, be late and
-black, and takes its pictures at keyframes. Other cameras have a detector of their own, world by
-world.
+The engine `fast` draws the pictures (`care_sim.sensors.engines.picture_kernels`), and an ideal
+camera detects (`care_sim.sensors.camera`). This camera may miss bodies, be late and black, and
+takes its pictures at keyframes. Other cameras have a detector of their own, world by world.
 """
 
 from collections.abc import Sequence
@@ -46,9 +45,10 @@ _DEPTHS = (NEAR_M, FAR_M)
 
 
 class Cameras(NamedTuple):
-    """The k cameras of a rig: their `models`; `mounts` (k, 4, 3), place and axes in the frame of
-    the sensor; `sizes` (k, 2), width and height in pixels; in each world the `least` (W,)
-    confidence of a box; and (W,) whether detections stay `unsorted`, for a detector to come.
+    """The k cameras of a rig and their `models`. `mounts` (k, 4, 3) are place and axes in the
+    sensor frame; `sizes` (k, 2) are width and height in pixels. `least` (W,) is the least
+    confidence of a box per world. `unsorted` (W,) says whether detections stay unsorted, for a
+    detector to come.
     """
 
     models: CameraModels
@@ -243,8 +243,8 @@ class OwnCameras:
 def photographed(
     engine: Engine, cameras: Sequence[PinholeCamera], sensor: Frame, boxes: Floats
 ) -> list[Integers]:
-    """The table of boxes (`care_sim.sensors.pictures`) of each camera, which an engine draws around
-    the `boxes` (n, 7) of all that a detector may ever report, in the frame of the sensor.
+    """Return the table of boxes (`care_sim.sensors.pictures`) of each camera, as an engine draws
+    it. `boxes` (n, 7), in the sensor frame, hold all that a detector may ever report.
     """
     return [engine.visible_boxes(one, sensor, one.window_on(boxes)) for one in cameras]
 

@@ -1,8 +1,8 @@
 """The state of W worlds, as arrays with a row per world that compiled code takes whole.
 
-W worlds, each with its own numbers of bodies, parts, tracks: tables are as long as the longest
-needs, and `counts` (W,) says how many rows of a world's table are in use. Rows beyond mean nothing.
-World frame, metres and radians, unless it says otherwise.
+Each of the W worlds has its own numbers of bodies, parts and tracks. Tables are as long as the
+longest needs. `counts` (W,) says how many rows of a world's table are in use; rows beyond mean
+nothing. World frame, metres and radians, unless it says otherwise.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -52,9 +52,9 @@ class Outlines(NamedTuple):
 
 
 class Reported(NamedTuple):
-    """The bodies that perception reports, by ascending id: `bodies` (W, R), their `classes` (W, R)
-    and, in the frames of the sensors, their `boxes` (W, R, 7) at the coming keyframe; and `by_body`
-    (W, B) the class of every body, -1 without one.
+    """The bodies that perception reports, by ascending id: `bodies` (W, R) and their `classes` (W,
+    R). Their `boxes` (W, R, 7) are at the coming keyframe, in the sensor frames. `by_body` (W, B)
+    is the class of every body, -1 without one.
     """
 
     counts: Integers
@@ -73,9 +73,9 @@ class TrackTables(NamedTuple):
 
 
 class Sensors(NamedTuple):
-    """Where the LiDAR of each car is now: `poses` (W, 6), x, y, z, yaw, roll, pitch; the cosine and
-    sine of yaw, `turns` (W, 2), and of -yaw, `turns_back` (W, 2). NumPy's, as in
-    `care_sim.core.frames`.
+    """Where the LiDAR of each car is now. `poses` (W, 6) are x, y, z, yaw, roll, pitch. `turns` (W,
+    2) are the cosine and sine of yaw, and `turns_back` (W, 2) those of -yaw. NumPy computes these,
+    as in `care_sim.core.frames`.
     """
 
     poses: Floats
@@ -133,10 +133,10 @@ class Fired(NamedTuple):
 
 
 class Passages(NamedTuple):
-    """Events while the worlds moved to the next keyframe; (W,) each, columns as in
-    `care_sim.world.approach.ClosestApproach`: `nearest_m`, `clearance_m`; whether there was an
-    impact, `hit`, and the ego's speed `impact_speed_mps` at the first one. `impacts` holds these
-    first impacts by world.
+    """Events while the worlds moved to the next keyframe, (W,) each. `nearest_m` and `clearance_m`
+    are as in `care_sim.world.approach.ClosestApproach`. `hit` says whether there was an impact, and
+    `impact_speed_mps` is the ego's speed at the first one. `impacts` holds these first impacts by
+    world.
     """
 
     nearest_m: Floats
@@ -191,8 +191,9 @@ class State:
             _counts(worlds), np.zeros((worlds, MAX_TRACKS, len(Tracks.COLUMNS))), _counts(worlds)
         )
         self.sensors = self.taken = self.driven = Sensors.of(worlds)
-        """Where the LiDARs are; where the software takes them to be; and where it takes the point
-        of the car's middle line beside them to be, from which the driver measures.
+        """Where the LiDARs are, and where the software takes them to be. The driver measures from
+        `driven`: the point of the car's middle line beside the LiDAR, where the software takes it
+        to be.
         """
         self.read = np.zeros((worlds, 3))
         """(W, 3) speed, yaw rate and acceleration that the odometry reads, within their limits."""

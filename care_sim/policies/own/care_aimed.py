@@ -40,22 +40,22 @@ ROW_WEIGHT = 4.5
 """Weight of the height against the width: a target's height counts as so many half widths."""
 MATCH_M, MATCH_SHARE = 3.0, 0.3
 """Two boxes can show one object if their places differ by less than this, or by less than this
-share of the range, whichever is more: a range by the height of a box is rough."""
+share of the range. The larger bound holds, because a range by the height of a box is rough."""
 _HEIGHTS_M = np.array([CATALOGUE[name].size[2] for name in CLASSES])
 Pictured = tuple[Floats, Mask]
-"""What the boxes of a picture show: places (n, 2) in metres, and whether each is on foot."""
+"""Content of the boxes of a picture: places (n, 2) in metres, and whether each is on foot."""
 _ON_FOOT = np.isin(CLASSES, ("pedestrian", "bicycle"))
 
 
 class CareAimed(Policy):
     """The paper's residual, also against the previous picture, with few well-placed cells per set.
 
-    Layers in order of priority: many cells of each unexplained box that the previous picture did
-    not show; the row at which things enter the range, within 60 degrees of straight ahead; three
-    cells of each hull; three cells of each older unexplained box; the rest of the new boxes; eight
-    more cells of each hull; a second row below the first, as wide; the rest of the first row; the
-    pattern `rows`. Each set begins in its middle, a little above half its height, unless the rig
-    has a cell order.
+    The first layer takes many cells of each unexplained box that the previous picture did not show.
+    The second is the row at which things enter the range, within 60 degrees of straight ahead.
+    Three cells of each hull follow, then three cells of each older unexplained box. Then come the
+    rest of the new boxes and eight more cells of each hull. The last layers are a second row below
+    the first, as wide; the rest of the first row; the pattern `rows`. Each set begins in its
+    middle, a little above half its height, unless the rig has a cell order.
 
     Each idea can be switched off: `aim` (else the core first, spread), `new` (else each unexplained
     box counts as new), `front` (else the rows come late).
@@ -177,8 +177,8 @@ def _bounds(values: Integers, group: Integers) -> tuple[Integers, Integers]:
 
 
 def box_places(detections: ImageDetections, rig: Rig) -> Floats:
-    """(n, 2) x and y in the sensor frame where the boxes show something, in metres: as far as the
-    typical height of its class appears as high as the box.
+    """Return the places (n, 2) of what the boxes show, x and y in the sensor frame, in metres. At
+    this range the typical height of the class appears as high as the box.
     """
     if not len(detections):
         return np.empty((0, 2))

@@ -178,8 +178,9 @@ def order_figures(rows: Sequence[Row]) -> dict[str, Figure]:
 
 
 def validation_figures(rows: Sequence[Row]) -> dict[str, Figure]:
-    """First detections and collisions in the world as it is and with each factor changed, one
-    column of panels per budget; a single world at several budgets in curves over the budget.
+    """Return figures of first detections and collisions in the world as it is and with each factor
+    changed. They have one column of panels per budget. A single world at several budgets has curves
+    over the budget.
     """
     worlds = played_worlds(rows)
     budgets = sorted({budget for world in worlds for budget in world.budgets})

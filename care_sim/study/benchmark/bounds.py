@@ -34,9 +34,9 @@ BOUNDS = (
 )
 """They stand beside the published entries, without a rank."""
 NEWCOMER_WEIGHT, PERSON_WEIGHT = 100.0, 4.0
-"""Worth of a newcomer and of a person among objects of worth 1: about the full scan's counts on
-streets, 60,000 objects kept, 18,000 people kept, 360 and 650 newcomers, so that a per cent of each
-weighs alike."""
+"""Worth of a newcomer and of a person among objects of worth 1. A per cent of each weighs about
+alike at the full scan's counts on streets: 60,000 objects kept, 18,000 people kept, 360 and 650
+newcomers."""
 _IS_PERSON = np.isin(CLASSES, PEOPLE)
 
 
@@ -127,9 +127,9 @@ class ShownBodies(Bodies):
 
 
 def marginal_gains(chances: Floats) -> Floats:
-    """Return what each further return (n,) adds to `chances` (n + 1,) of 0, 1, 2, ... returns,
-    never more than the one before it: where a detector needs three returns, each of them gains a
-    third of what the three gain together.
+    """Return what each further return (n,) adds to `chances` (n + 1,) of 0, 1, 2 and more returns.
+    No return adds more than the one before it. If a detector needs three returns, each adds a third
+    of what the three add together.
     """
     from scipy.optimize import isotonic_regression
 

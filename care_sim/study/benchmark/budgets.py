@@ -95,8 +95,8 @@ class BudgetRow(NamedTuple):
 class BudgetResult:
     """Counts of an entry at every budget, world by world, under a detector.
 
-    `quick` is a trial on a few streets; `made_by` are versions and machine; `sealed` is the digest
-    of the salt that drew the worlds; `policy_ms` are p50 and p99 of a decision of the policy on
+    `quick` is a trial on a few streets. `made_by` are versions and machine. `sealed` is the digest
+    of the salt that drew the worlds. `policy_ms` are p50 and p99 of a decision of the policy on
     streets, each the median over its plays, in milliseconds.
     """
 

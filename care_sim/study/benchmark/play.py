@@ -29,7 +29,7 @@ class Player:
 
     def rows(self, configs: Sequence[RunConfig]) -> list[Row | None]:
         """The row of every configuration; None of one that failed."""
-        # A copy has no key yet: its digest is of the code as it is when this run asks for it.
+        # A copy has no key yet: its digest is of the code at the time of this run.
         asked = {config: config.changed() for config in configs}
         plays = [own for own in asked.values() if isinstance(own, PlayConfig)]
         episodes = [own for own in asked.values() if not isinstance(own, PlayConfig)]

@@ -20,14 +20,15 @@ ONE_IN = 10
 """One world in so many of every part is played again, and at least `LEAST_WORLDS`: a single
 recorded drive may have one newcomer."""
 ROUNDING = 0.01
-"""Share of the full scan's that the sum of a count may move by on another machine or library: it
-rounds the last bit of a direction otherwise, and fires other cells."""
+"""The sum of a count may move by this share of the full scan's on another machine or library. Other
+rounding of the last bit of a direction fires other cells."""
 
 
 @dataclass(frozen=True)
 class Replay:
-    """The number of worlds that were played again, those with other counts, the largest move of the
-    sum of a count as a share of the full scan's, and what else is false in the file.
+    """Result of playing worlds again: the number of worlds `played` and the worlds with `differing`
+    counts. `moved` is the largest move of the sum of a count, as a share of the full scan's.
+    `false` lists what else is false in the file.
     """
 
     played: int

@@ -29,8 +29,9 @@ from care_sim.study.run_config import RunConfig
 
 DRIVES, TESTS, STREETS = "drives", "tests", "streets"
 FIRST_SEED = 200
-"""The test seeds below it were looked at while the worlds were built (0 to 137 of the drives), and
-policies were first tried on some of them (streets 0 to 19, drives 100 to 139)."""
+"""First test seed of the benchmark. Seeds below were looked at while the worlds were built (0 to
+137 of the drives). Policies were first tried on some of them (streets 0 to 19, drives 100 to
+139)."""
 LATE = {"camera_latency_s": 0.12}
 """The paper's evidence is 0.11 to 0.14 s old on average."""
 _EPISODES = Path(__file__).with_name("worlds.json")
@@ -43,7 +44,7 @@ _LONGEST_NAME = 120
 BOUNDS_MODULE = "care_sim.study.benchmark.bounds:"
 """The module of the policies that know the truth; the benchmark plays none for anybody."""
 _UNTABLED = "|<>$`"
-"""What tables, pages and figures take for more than text."""
+"""Characters that tables, pages and figures take for more than text."""
 _SCENARIOS: dict[str, tuple[str, Parameters]] = {
     DRIVES: ("drive", ()),
     TESTS: ("ncap", (("test", "drawn"), ("speed_kph", 0))),
