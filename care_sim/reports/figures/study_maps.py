@@ -308,7 +308,7 @@ def r157_figures(rows: Sequence[Row]) -> dict[str, Figure]:
 
     figure = maps_figure(
         "gap (m) by relative speed (km/h); empty: no case that a careful human prevents",
-        [[drawn(policy, budget) for policy in study.policies] for budget in study.budgets],
+        [[drawn(policy, budget) for policy in study.policies] for budget in study.budgets or [1.0]],
         [f"{gap:g}" for gap in gaps],
         [f"{speed:g}" for speed in speeds],
         unit="preventable cases avoided (%)",

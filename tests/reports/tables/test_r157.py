@@ -48,3 +48,10 @@ def test_a_panel_for_every_policy_and_budget_coloured_by_what_was_avoided():
     (shown,) = panels[0].images
     assert np.ma.filled(shown.get_array(), np.nan).tolist() == [[25.0]]
     assert ticks(panels[-1]) == ["20"]
+
+
+def test_a_full_scan_alone_has_one_panel():
+    figure = r157_figures(cut_ins("full", [None] * 4))["r157-avoided"]
+    assert [title for axes in figure.axes if (title := axes.get_title(loc="left"))] == [
+        "full, every cell"
+    ]
