@@ -116,6 +116,12 @@ def check_flag(name: str, value: object) -> None:
         raise InvalidInput(f"{name} must be True or False, got {shown(value)}")
 
 
+def check_flags(**switches: object) -> None:
+    """Raise InvalidInput unless all `switches` are True or False."""
+    for name, value in switches.items():
+        check_flag(name, value)
+
+
 def check_seed(seed: object, name: str = "seed") -> None:
     """Raise InvalidInput for a seed that no column holds."""
     check_whole(name, seed, 0, LARGEST_SEED)

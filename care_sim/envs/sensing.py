@@ -167,7 +167,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         )
         self.action_space = spaces.Box(0.0, 1.0, grid.shape, np.float32)
         self.observation_space = observation_space(self.rig)
-        self._choice = Choice(self._rig, conditions, np.array([self._rig.budget]))
+        self._choice = Choice([self._rig], conditions)
         self._running: AnyLoop | None = None
         self._over = False
 

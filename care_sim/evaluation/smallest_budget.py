@@ -2,7 +2,7 @@
 
 An entry plays the same worlds at each of `BUDGETS`. The share of a count is its sum over the
 worlds, divided by the full scan's sum: every object has the same weight. A share of 90% is enough.
-Of needless stops, up to 5 in 100 worlds more than the full scan's are allowed. Between two budgets
+A policy may stop without need in up to 5 in 100 worlds more than the full scan. Between two budgets
 shares are linear in the logarithm of the budget.
 
 More cells should never be worse. A curve that falls below 90% again is unreliable above its first

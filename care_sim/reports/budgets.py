@@ -89,7 +89,7 @@ def ideas_table(whole: BudgetResult, without: Mapping[str, BudgetResult]) -> Tab
     ]
     name = whole.entry.name
     return Table(
-        f"What each idea of {name} is worth: B90 without it, {_worlds(whole)}, {whole.detector}",
+        f"Ideas of {name}: B90 without each, {_worlds(whole)}, {whole.detector}",
         ("policy", "B90", "held back by", f"times {name}", *whole.parts),
         tuple(rows),
         (f"{NOTE} Parts hold the ratio too. Bold ratios exclude 1.",),

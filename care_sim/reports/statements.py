@@ -102,7 +102,7 @@ def statements_table(columns: Columns, pairs: Iterable[Pair] = QUESTIONS) -> Tab
         )
         rows.append((told.first, told.second, str(told), *ratios))
     return Table(
-        f"Who needs fewer cells, under {counted(len(alike), 'detector')}, "
+        f"Pairs of policies, under {counted(len(alike), 'detector')}, "
         f"{counted(len(main[0].rows), 'world')}",
         ("policy", "needs fewer cells than", "holds", *alike),
         tuple(rows),

@@ -241,8 +241,7 @@ def play_together(configs: Sequence[EpisodeConfig]) -> list[Row]:
         settings = [model.setting] * count
         if model.setting.detector is not None:
             settings = [closed_loop(config.make_env()).setting for config in configs]
-        budgets = np.array([setting.rig.budget for setting in settings])
-        choice = Choice(model.rig, model.conditions, budgets)
+        choice = Choice([setting.rig for setting in settings], model.conditions)
         with closing(Worlds(settings, choice, observed, exact=False)) as worlds:
             infos = worlds.begin({world: config.seed for world, config in enumerate(configs)})
             policy.reset()

@@ -64,6 +64,12 @@ def test_a_newcomer_on_foot_comes_before_a_car_that_is_known():
     assert cells[0] in cells_of([WALKER], 1)
 
 
+def test_a_bus_that_enters_comes_before_a_car_that_is_known():
+    *_, cells = demanded(BODIES)
+    bus, car = cells_of([BUS], 2), cells_of([AHEAD], 2)
+    assert next(cell for cell in cells if cell in bus ^ car) in bus
+
+
 def test_three_returns_that_a_detector_needs_gain_a_third_each():
     gains = marginal_gains(np.array([0.0, 0.0, 0.0, 0.9, 0.95]))
     assert gains.tolist() == pytest.approx([0.3, 0.3, 0.3, 0.05])

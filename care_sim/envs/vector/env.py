@@ -281,8 +281,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
     def _made(self, share: slice) -> Worlds:
         rows = _rows(self._observed, share)
         settings = [model.setting for model in self._models[share]]
-        budgets = np.array([one.rig.budget for one in settings])
-        choice = Choice(self._model.rig, self._model.conditions, budgets)
+        choice = Choice([one.rig for one in settings], self._model.conditions)
         # Infos without clearances need few of them.
         return Worlds(settings, choice, rows, self._model.scoring_info, self._one_budget)
 

@@ -23,13 +23,14 @@ _NOTHING = np.empty(0, np.int64)
 
 
 class Choice:
-    """Chooses the cells that the LiDARs of W worlds fire, each within its own of the `budgets`
-    (W,). The hardware is that of the `rig`, the floor that of the `conditions`.
+    """Chooses the cells that the LiDARs of W worlds fire. The `rigs` of the worlds differ at most
+    in budget and camera. The `conditions` give the floor.
     """
 
-    def __init__(self, rig: Rig, conditions: Conditions, budgets: Integers):
-        worlds, most = len(budgets), int(budgets.max())
-        self._budgets = budgets
+    def __init__(self, rigs: Sequence[Rig], conditions: Conditions):
+        rig, worlds = rigs[0], len(rigs)
+        self._budgets = np.array([each.budget for each in rigs])
+        most = int(self._budgets.max())
         self._conditions = conditions
         self._rig = rig
         self._is_free = rig.firing == CELLS

@@ -133,12 +133,12 @@ def _own_cells_by_row(rig: Rig, head: Head, elevation_deg: float | None) -> Cell
     return cells
 
 
-def entry_cells(rig: Rig) -> Cells:
-    """Return (lidars * columns,) the cell of every column at which objects enter the scored range,
-    LiDAR after LiDAR.
+def entry_cells(rig: Rig, elevation_deg: float | None = None) -> Cells:
+    """Return (lidars * columns,) the cell of every column nearest to an elevation, LiDAR after
+    LiDAR. By default it is the elevation at which objects enter the scored range.
     """
     columns = rig.grid.columns
-    nearest = [_own_cells_by_row(rig, head, None)[:columns] for head in rig.grid.heads]
+    nearest = [_own_cells_by_row(rig, head, elevation_deg)[:columns] for head in rig.grid.heads]
     return np.concatenate([cells[np.argsort(cells % columns)] for cells in nearest])
 
 

@@ -5,7 +5,7 @@ any set gets more.
 from collections.abc import Mapping
 from typing import ClassVar, NamedTuple
 
-from care_sim.base.checks import check_flag, check_whole
+from care_sim.base.checks import check_flags, check_whole
 from care_sim.core.belief import Belief
 from care_sim.core.beliefs import Beliefs
 from care_sim.core.cells.sets import CellSets, WorldSets
@@ -121,7 +121,7 @@ class CareSector(Policy):
     ):
         super().__init__(rig)
         self._round = Round.of(min_returns)
-        _check_switches(
+        check_flags(
             residual=residual,
             camera=camera,
             tracks=tracks,
@@ -163,11 +163,6 @@ class CareSector(Policy):
         if self._uses_residual:
             return camera_layers(belief, self.rig)
         return wedges_of_boxes(belief.detections, self.rig), CellSets.of([])
-
-
-def _check_switches(**switches: bool) -> None:
-    for name, value in switches.items():
-        check_flag(name, value)
 
 
 WEDGE_ROUNDS = 4
@@ -215,7 +210,7 @@ class CareSightlines(Policy):
         super().__init__(rig)
         self._round = Round.of(min_returns)
         check_whole("wedge_rounds", wedge_rounds, 1)
-        _check_switches(
+        check_flags(
             camera=camera, ahead=ahead, explained=explained, sight_lines=sight_lines, rows=rows
         )
         self._wedge_most = wedge_rounds * self._round.wedge

@@ -6,23 +6,23 @@ import math
 
 import numpy as np
 
-from care_sim.base.checks import check_flag, check_whole
+from care_sim.base.checks import check_flags, check_whole
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import Belief
 from care_sim.core.cells.sets import CellSets
 from care_sim.core.defaults import AS_DEMANDED
-from care_sim.core.grid import Cells
 from care_sim.core.residual import explained, ray_starts, wedge_rays, wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Demand, Ego, ImageDetections
 from care_sim.policies.base import Policy
 from care_sim.policies.controls.patterns import ENTRY_HEIGHT_M, cells_by_row, entry_cells
 from care_sim.policies.own.care import CORE_FIRST
+from care_sim.policies.own.sight_lines import columns_ahead
 from care_sim.world.bodies import CATALOGUE
 
 FRONT_RAD = math.radians(60)
-"""Half of the front that is watched. Of the emerging newcomers without a camera box, four in five
-appear within it (streets 2000 to 2031)."""
+"""Half of the front that is watched. Four in five emerging newcomers without a camera box appear
+within it (streets 2000 to 2031)."""
 SECOND_M = 25.0
 """The second row that is watched is where the middle of a car is at this range."""
 HULL_CELLS = 3
@@ -34,8 +34,8 @@ NEW_CELLS, NEW_MOST = 24, 48
 MORE_CELLS = 8
 """Further cells of each hull."""
 AIM_HEIGHT = 0.4
-"""Where cells come first: this share of the target's height below its top. What stands before a
-target hides its lower part, and a head is narrow."""
+"""Where cells come first: this share of the target's height below its top. Obstacles hide the
+lower part of a target, and a head is narrow."""
 ROW_WEIGHT = 4.5
 """Weight of the height against the width: a target's height counts as so many half widths."""
 MATCH_M, MATCH_SHARE = 3.0, 0.3
@@ -75,16 +75,15 @@ class CareAimed(Policy):
     ):
         super().__init__(rig)
         check_whole("hull_cells", hull_cells, 1)
-        for name, value in {"aim": aim, "new": new, "front": front}.items():
-            check_flag(name, value)
+        check_flags(aim=aim, new=new, front=front)
         self._few = hull_cells
         self._aims, self._compares = aim, new
         self._rows = cells_by_row(rig)
         self._entries = entry_cells(rig)
         fall = math.atan((ENTRY_HEIGHT_M - rig.sensor_height_m) / SECOND_M)
-        second = cells_by_row(rig, math.degrees(fall))[: len(self._entries)]
-        self._front = CellSets.of([_ahead(rig, self._entries, FRONT_RAD)] if front else [])
-        self._second = CellSets.of([_ahead(rig, second, FRONT_RAD)] if front else [])
+        ahead = columns_ahead(rig.grid, FRONT_RAD)
+        rows = self._entries, entry_cells(rig, math.degrees(fall))
+        self._front, self._second = ([row[ahead]] if front else [] for row in rows)
         self.reset()
 
     def reset(self) -> None:
@@ -131,15 +130,6 @@ class CareAimed(Policy):
         if self._aims and self.rig.cell_order == AS_DEMANDED:
             return aimed(sets, self.rig).part(0, most)
         return self.rig.listed(sets, CORE_FIRST, most)
-
-
-def _ahead(rig: Rig, cells: Cells, half_rad: float) -> Cells:
-    """Return those of the cells within `half_rad` of straight ahead, the nearest to it first."""
-    off_ahead = np.stack([np.abs(head.grid.azimuths) for head in rig.grid.heads])
-    off = off_ahead[rig.grid.lidars_of(cells), cells % rig.grid.columns]
-    nearest_first = np.argsort(off, kind="stable")
-    kept: Cells = cells[nearest_first[off[nearest_first] <= half_rad]]
-    return kept
 
 
 def aimed(sets: CellSets, rig: Rig) -> CellSets:

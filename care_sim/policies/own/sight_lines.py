@@ -20,14 +20,14 @@ with two lanes, parked cars and pavements.
 """
 
 
-def columns_ahead(grid: Grid) -> Cells:
-    """Return (n,) the columns whose middle is within `AHEAD_RAD` of straight ahead, the nearest
+def columns_ahead(grid: Grid, half_rad: float = AHEAD_RAD) -> Cells:
+    """Return (n,) the columns whose middle is within `half_rad` of straight ahead, the nearest
     first; none on a grid with wider columns. Columns of the second of several LiDARs are numbered
     after those of the first.
     """
     off_ahead = np.abs(np.concatenate([head.grid.azimuths for head in grid.heads]))
     nearest_first = np.argsort(off_ahead, kind="stable")
-    columns: Cells = nearest_first[off_ahead[nearest_first] <= AHEAD_RAD]
+    columns: Cells = nearest_first[off_ahead[nearest_first] <= half_rad]
     return columns
 
 

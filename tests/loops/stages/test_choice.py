@@ -58,7 +58,8 @@ UNASKED = [([at()] * 3, [True, False, True])] * 3
 def test_every_world_fires_as_if_alone(played, budgets, floor, floor_seed, firing):
     rig = Rig(GRID, firing=firing)
     conditions = ClosedLoopConditions(floor=floor, floor_seed=floor_seed)
-    choice = Choice(rig, conditions, np.array(budgets))
+    rigs = [Rig(GRID, budget=budget, firing=firing) for budget in budgets]
+    choice = Choice(rigs, conditions)
     keys, last = [], [NOTHING] * WORLDS
     for world in range(WORLDS):
         choice.begin(world, np.random.SeedSequence(world))
