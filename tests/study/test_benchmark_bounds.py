@@ -64,10 +64,10 @@ def test_a_newcomer_on_foot_comes_before_a_car_that_is_known():
     assert cells[0] in cells_of([WALKER], 1)
 
 
-def test_a_bus_that_enters_comes_before_a_car_that_is_known():
+def test_a_bus_that_enters_comes_before_a_person_who_is_known():
     *_, cells = demanded(BODIES)
-    bus, car = cells_of([BUS], 2), cells_of([AHEAD], 2)
-    assert next(cell for cell in cells if cell in bus ^ car) in bus
+    bus, person = cells_of([BUS], 2), cells_of([WALKER], 2)
+    assert next(cell for cell in cells if cell in bus ^ person) in bus
 
 
 def test_three_returns_that_a_detector_needs_gain_a_third_each():
