@@ -162,8 +162,9 @@ def test_the_first_page_counts_the_collisions_of_other_drives(page):
     seeds = {row["seed"] for row in rows if row["policy"] == "history"}
     hits = Counter(row["policy"] for row in rows if row["seed"] in seeds and row["collision"])
     told = (
-        f"In {len(seeds)} other drives, history collides in {hits['history']}, CARE in "
-        f"{hits['care']}, a fan straight ahead in {hits['fan']}."
+        f"In {len(seeds)} other drives, `history` collides in {hits['history']} and `care` in "
+        f"{hits['care']}. A fixed fan of rays straight ahead, without a camera, collides in only "
+        f"{hits['fan']}."
     )
     assert told in " ".join((ROOT / page).read_text().split())
 
