@@ -124,8 +124,8 @@ def _end_with(error: BaseException, trace: bool) -> NoReturn:
 
 def _settle_output() -> None:
     """Prepare standard output and error for whatever is printed."""
-    # A process without a terminal may have no streams at all. What an encoding lacks is written as
-    # an escape.
+    # A process without a terminal may have no streams at all. Characters that an encoding lacks are
+    # written as escapes.
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:

@@ -195,7 +195,7 @@ def third_party(tmp_path, monkeypatch):
 
 
 class Read:
-    """What a recording holds: `fixed` entities, and of the others their rows by keyframe."""
+    """The content of a recording: `fixed` entities, and the rows of the others by keyframe."""
 
     def __init__(self, path):
         from rerun.chunk import RrdReader

@@ -73,11 +73,11 @@ USES = {
         f"care-sim run dense --detector onnx --detector-parameters file=none.onnx {SHORT}",
     ],
 }
-"""What each extra is for, as commands; what they write lies in an empty folder."""
+"""Commands that use each extra; they write to an empty folder."""
 
 
 def fails(extra: str, wheel: Path, constraints: Path) -> str:
-    """What went wrong with an extra, in the words of the command; empty where all is well."""
+    """The failure of an extra, in the words of the command; empty where all is well."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "cluster.py").write_text(SCHEDULER)

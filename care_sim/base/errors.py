@@ -56,7 +56,8 @@ def class_place(kind: type) -> str:
 def _is_foreign(frame: FrameType) -> bool:
     """Return True for code of neither the benchmark nor a library that adds nothing to it."""
     file = Path(frame.f_code.co_filename)
-    # What Python itself makes, such as the methods of dataclasses, has a name in brackets.
+    # Code that Python itself makes, such as the methods of dataclasses, has a file name in
+    # brackets.
     if not file.is_absolute() or file.is_relative_to(_OURS):
         return False
     if not any(map(file.is_relative_to, _LIBRARIES)):

@@ -103,8 +103,8 @@ def _load_libusb() -> None:
 @contextmanager
 def silence_output(descriptor: int) -> Iterator[None]:
     """Nothing that is written to a file descriptor comes through while this lasts."""
-    # C keeps a buffer of its own. What it holds from before must leave it while the descriptor
-    # still leads out, and what is printed meanwhile must leave it before the descriptor does again.
+    # C keeps a buffer of its own. Flush earlier text while the descriptor still leads out, and text
+    # printed meanwhile before the descriptor leads out again.
     c_library = ctypes.CDLL(None)
     c_library.fflush(None)
     try:

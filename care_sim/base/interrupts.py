@@ -64,7 +64,8 @@ def hold_interrupts() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    # Only handlers of Python can wait in a list. What is ignored, or the system's, stays so.
+    # Only handlers of Python can wait in a list. Signals that are ignored, or that the system
+    # handles, stay so.
     waiting: list[int] = []
     with _defer_signals():
         handlers = {number: signal.getsignal(number) for number in _HEARD}

@@ -1,9 +1,9 @@
 """Registries of things that a user names: built-in ones, and those of installed packages.
 
 A package adds one through an entry point. Its name is what the user writes. Its object is a class
-or another callable that makes the thing. Of two entries with one name the first on the path counts,
-as for modules. A built-in name cannot be taken. A kind whose entries have longer names maps them to
-what the user writes.
+or another callable that makes the thing. If two entries have one name, the first on the path
+counts, as for modules. A built-in name cannot be taken. A kind whose entries have longer names maps
+them to what the user writes.
 
 Anything else is named by its place, MODULE:OBJECT. The module is found as Python finds it, or in
 the folder in which the program was started.
@@ -116,7 +116,7 @@ class Plugins(Generic[Made]):
 
     def entries(self) -> dict[str, EntryPoint]:
         """The entry that counts, by name."""
-        # Of one name the last that is put in stays, and reversed that is the first on the path.
+        # A dict keeps the last entry of a name; in reversed order that is the first on the path.
         return {self.called(entry.name): entry for entry in reversed(self.all_entries())}
 
     def hidden_entries(self) -> Iterator[tuple[EntryPoint, EntryPoint | None]]:

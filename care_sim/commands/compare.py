@@ -81,7 +81,7 @@ def play_side_by_side(
                 # One by one, so that an interrupt leaves those that were played.
                 answers.append(result_or_reason(played, config))  # noqa: PERF401
     finally:
-        # What was played is printed whatever happens to the others.
+        # Print the episodes that were played, whatever happens to the others.
         failures = _report(configs, answers)
     finish_files(record, film, video)
     check_worlds(row for row in answers if not isinstance(row, str))

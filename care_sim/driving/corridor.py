@@ -92,7 +92,8 @@ def enters(of: Footprint, sideways: float, strip: Strip) -> bool:
 @compiled(error_model="numpy")
 def leaves_s(of: Footprint, sideways: float, strip: Strip) -> float:
     """Seconds until a footprint that moves `sideways`, m/s, and enters the strip has left it; at
-    most the horizon after it has entered it. Of one that never enters it says nothing.
+    most the horizon after it has entered it. The value has no meaning for a footprint that never
+    enters it.
     """
     _, y, _, half_y = of
     _, reach_m, horizon_s = strip

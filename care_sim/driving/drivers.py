@@ -206,8 +206,8 @@ class Cruising:
     """Comfortable driving along a route by a plan: slow for bends, and follow who drives ahead.
 
     It is what a driver does before anything calls for the brake, so it acts only while the brake is
-    off. Who drives ahead is the nearest track in the strip that the ego sweeps that moves along the
-    way. It is followed by the intelligent driver model (Treiber, Hennecke and Helbing 2000):
+    off. The vehicle ahead is the nearest track in the ego's swept strip that moves along the way.
+    It is followed by the intelligent driver model (Treiber, Hennecke and Helbing 2000):
     a (1 - (v / v_0)^4 - (s* / s)^2) with s* = s_0 + v T + v dv / (2 sqrt(a b)).
 
     `front_m` and `half_width_m` are the ego's extents seen from its sensor.

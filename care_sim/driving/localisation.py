@@ -35,7 +35,7 @@ class Localisation:
     def advance(self) -> None:
         """Go on to the next keyframe, and to its error."""
         if not self._is_exact:
-            # What is forgotten is drawn anew, so that the spread stays the same.
+            # The forgotten part is drawn anew, so that the spread stays the same.
             new = math.sqrt(1 - self._kept**2)
             self._error = self._kept * self._error + new * self._drawn()
 

@@ -144,7 +144,7 @@ def reserve_use(
     return ReserveUse(
         keyframes=1,
         filled=int(len(exploited) + len(taken) == budget),
-        # What exploitation may take is rounded, and the reserve keeps the rest.
+        # The share of exploitation is rounded, and the reserve keeps the rest.
         filled_rho=int(len(taken) >= budget - half_up((1 - reserve_fraction) * budget)),
         explained_cells=len(removed),
         untaken_cells=len(np.setdiff1d(removed, exploited)),

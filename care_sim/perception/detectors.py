@@ -1,8 +1,8 @@
 """Detectors by name: the proxy, the built-in real ones, and those that installed packages add.
 
 An entry of the group `care_sim.detectors` names a `PointDetector` class, or another callable that
-makes one from the user's parameters. Of two entries with one name the first on the path counts, and
-a built-in name is taken.
+makes one from the user's parameters. If two entries have one name, the first on the path counts. A
+built-in name cannot be taken.
 """
 
 import inspect

@@ -169,8 +169,8 @@ def collisions(rows: Sequence[Row]) -> list[str]:
 
 
 def shared_conditions(rows: Sequence[Row]) -> list[str]:
-    """The conditions of all episodes, in a sentence where they are not the default. What a
-    scenario was given is a part of the study.
+    """The conditions of all episodes, in a sentence where they are not the default. The parameters
+    of a scenario are a part of the study.
     """
     # The full scan does not feel all conditions.
     own = [row for row in rows if row["policy"] != FULL] or rows

@@ -172,7 +172,7 @@ class TerminalTable:
         widths = [self._width(n) for n in columns]
         left = options.max_width - sum(widths)
         for place, n in enumerate(columns):
-            # What is left goes to entries and headings that are broken, from left to right.
+            # Entries and headings that are broken get the width that is left, from left to right.
             longest = max(map(cell_len, [table.columns[n], *table.entries(n)]))
             more = min(max(longest + 1 - widths[place], 0), max(left, 0))
             widths[place] += more

@@ -44,7 +44,7 @@ def _choices(scenario: type[Scenario], field: Field[Any]) -> str:
     """The values that a parameter may have, and which the seed draws, in brackets; empty where
     there is nothing to tell.
     """
-    # Those of another package may be called the same and mean something else.
+    # Parameters of another package may have the same name and another meaning.
     ours = scenario in SCENARIOS.values()
     told = (
         allowed(field),

@@ -141,7 +141,7 @@ class CameraDetector:
         # In the dark nothing is reported, false boxes included; delays go on.
         if self._sensing.black_at(time_s):
             rows, objects = rows[:0], objects[:0]
-        # Of equally sure boxes the leftmost comes first: nothing depends on the order of bodies.
+        # The leftmost of equally sure boxes comes first: nothing depends on the order of bodies.
         rows, objects = sort_by_confidence(rows, objects, self._least_confidence)
         seen_here = Detected(np.array([len(rows)]), rows[None], objects[None])
         self._delay.take(_HERE, seen_here, np.array([heading], float))

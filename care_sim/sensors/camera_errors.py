@@ -80,7 +80,7 @@ def seen_as(
 def whole_boxes(camera: PinholeCamera, boxes: Floats) -> Floats:
     """Return (n, 4) the image boxes of whole 3D boxes (n, 7), cut at the picture's edges."""
     limits = np.tile([camera.width, camera.height], 2)
-    # What is wholly behind the camera spans nothing.
+    # A box wholly behind the camera spans nothing.
     return np.clip(np.nan_to_num(camera.project_boxes(boxes), nan=0.0), 0.0, limits)
 
 
@@ -113,7 +113,7 @@ def jitter_boxes(
     sizes = boxes[:, 2:] - boxes[:, :2]
     middles = (boxes[:, :2] + boxes[:, 2:]) / 2 + sizes * np.column_stack([across, down])
     half = sizes * np.exp(np.column_stack([wider, higher])) / 2
-    # Of a box at the edge something stays in the picture: it was seen there.
+    # A part of a box at the edge stays in the picture: it was seen there.
     pictures = np.array([(camera.width, camera.height) for camera in cameras], float)
     limits = pictures.reshape(-1, 2)[of_cameras]
     low = np.clip(middles - half, 0.0, limits - LEAST_PX)
@@ -135,7 +135,7 @@ def confuse_classes(classes: Integers, draws: Floats, matrix: Floats) -> Integer
 
 @dataclass(frozen=True)
 class _Ghost:
-    """A false box that follows the pool's `object` in the pictures of its `camera`. Those pictures
+    """A false box that follows the pool's `object` in the pictures of its `camera`. These pictures
     were taken `later_s` seconds after the current ones. `draws` (3,) vary its boxes.
     """
 

@@ -81,15 +81,16 @@ class CellFaults:
 def noisy(ranges: Floats, errors: Floats, reach: float | Floats) -> Floats:
     """(n,) `ranges` with `errors`, metres; the `reach` is that of all, or (n,) of each.
 
-    What would come within NEAREST_M of 0 or of the reach, or beyond, is folded back. If it were cut
-    instead, ranges would heap up at one number, which would tell a policy that they were cut.
+    Ranges that would come within NEAREST_M of 0 or of the reach, or beyond, are folded back. If it
+    were cut instead, ranges would heap up at one number, which would tell a policy that they were
+    cut.
     """
     erring = ranges + errors
     span = reach - 2 * NEAREST_M
     # A triangle wave: the way from the near bound to the far one and back is 2 * span long.
     beyond = np.mod(erring - NEAREST_M, 2 * span)
     folded: Floats = NEAREST_M + np.minimum(beyond, 2 * span - beyond)
-    # What lies between the bounds is left to the last bit; folding would round it.
+    # Ranges between the bounds stay as they are to the last bit; folding would round them.
     return np.where(np.abs(erring - reach / 2) <= span / 2, erring, folded)
 
 
@@ -191,7 +192,7 @@ class Lidar:
         """
         scan, _ = self._cast(np.arange(self.grid.size), sensor)
         if len(scan.cells) > self.grid.size:
-            # Of a cell with two returns the nearer one, which comes first.
+            # A cell with two returns keeps the nearer one, which comes first.
             scan = scan.take(np.diff(scan.cells, prepend=-1) > 0)
         return _without(scan, self._faults.dead)
 

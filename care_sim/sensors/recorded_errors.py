@@ -33,9 +33,9 @@ KEPT = {
     "pedestrian": (0.59, 0.54, 0.60, 0.65),
 }
 """The share of the returns of our bodies that an object of nuScenes has: glass, dark paint, and a
-shape that does not fill its box. Of 3,279 boxes in 81 keyframes the returns that nuScenes counted,
-over those of rays that are cast at bodies in the same boxes, on as many columns. Trucks within 10 m
-and buses beyond 20 m are too few, and have the nearest figure."""
+shape that does not fill its box. The shares divide the returns that nuScenes counted in 3,279 boxes
+(81 keyframes) by our own. Our rays were cast at bodies in the same boxes, on as many columns.
+Trucks within 10 m and buses beyond 20 m are too few, and have the nearest figure."""
 KEPT_SPREAD = 0.25
 """By which an object departs from that share, evenly up or down: of cars within 20 m nine in ten
 lie within 0.25 of the middle."""
@@ -51,7 +51,7 @@ _PASSED = np.array([PASSED[name] for name in CLASSES])
 OWN_CAR_SHARES = 0.82, 0.47, 0.26, 0.12, 0.0
 OWN_CAR_DEG = -30.7, -25.3, -24.0, -22.7, -21.3
 """Shares of the rays at these elevations that end on the car itself: rows of the HDL-32E of
-nuScenes, 1.84 m above the road. Of the lowest row four in five do."""
+nuScenes, 1.84 m above the road. In the lowest row four of five rays do."""
 SIGMA_M, SIGMA_PER_M = 0.004, 0.00016
 """Standard deviation of a range at the sensor, and by how much it grows per metre."""
 

@@ -103,7 +103,8 @@ def brightness(
     Unit `rays` (n, 3) from `origins` (n, 3) or (3,) met `bodies` (n,) at `ranges` (n,), all in the
     world as it stands now.
     """
-    # What was met and has no parts is the road: level, so that the slope of a ray is its angle.
+    # A body that was met and has no parts is the road: level, so that the slope of a ray is its
+    # angle.
     solid = np.isin(bodies, parts.tables[-1])
     met = np.flatnonzero(solid)
     road = np.flatnonzero(~solid & (bodies != NO_BODY))
@@ -158,7 +159,7 @@ def echoes_of(ranges: Floats, intensities: Floats, bodies: Integers) -> Echoes:
     ranges = np.take_along_axis(ranges, order, axis=0)
     intensities = np.take_along_axis(intensities, order, axis=0)
     bodies = np.take_along_axis(bodies, order, axis=0)
-    # From the near end of a beam on, a gap begins the next echo. What met nothing comes last.
+    # From the near end of a beam on, a gap begins the next echo. Rays without a hit come last.
     met = np.isfinite(ranges)
     gaps = np.diff(np.where(met, ranges, 0.0), axis=0) > SEPARATION_M
     number = np.vstack([np.zeros((1, beams), np.int64), np.cumsum(gaps, axis=0)])

@@ -133,7 +133,7 @@ def sense(
     reported = [one for one in annotated if one.label is not None]
     annotations = annotations_of(reported)
     with closing(BulletWorld(ground=False)) as world:
-        # All of them occlude. Those of the five classes have a number in the film.
+        # All of them occlude. Bodies of the five classes have a number in the film.
         bodies = {id(one): _add(world, one, sensor) for one in annotated}
         numbers = {bodies[id(one)]: one.number for one in reported}
         labels = {bodies[id(one)]: CLASSES.index(str(one.label)) for one in reported}

@@ -221,7 +221,7 @@ def report_empty_boxes(
     """Print once how many boxes of a scene hold no recorded point, and how many newcomers there are
     without and with them.
 
-    `every` are all annotations per keyframe, and `filled` (n,) which of them hold a point. Those
+    `every` are all annotations per keyframe, and `filled` (n,) which of them hold a point. Boxes
     within `range_m` metres count.
     """
     near = [planar_ranges(annotations.boxes) <= range_m for annotations in every]

@@ -63,9 +63,9 @@ def record(street: Street, setup: SensorSetup = _DEFAULT, returns: FilmedReturns
 
     An object is annotated at a keyframe if a return of the full sweep lies on it or a camera shows
     it. Similarly nuScenes scores objects with at least one LiDAR or radar point. Wholly hidden
-    objects cannot be seen. Those hidden at the first keyframe are in `Film.hidden`. The annotations
-    do not depend on the return model: they hold the objects that plain rays or a camera meet.
-    Raises InvalidInput for a pose that is not finite.
+    objects cannot be seen. Objects hidden at the first keyframe are in `Film.hidden`. The
+    annotations do not depend on the return model: they hold the objects that plain rays or a camera
+    meet. Raises InvalidInput for a pose that is not finite.
     """
     check_filmed(returns)
     columns = [f"{kind} (column {number})" for number, kind in enumerate(street.kinds)]
@@ -133,7 +133,7 @@ class _StreetBodies:
         self._street = street
         self._world = world
         self._setup = setup
-        # What is farther than the LiDAR reaches is met by no ray.
+        # No ray meets a body that is farther than the LiDAR reaches.
         reaches = [head.grid.range_m + np.hypot(*head.place[:2]) for head in setup.grid.heads]
         self._sight_m = max(SIGHT_M, *reaches)
         self._sizes = np.array([CATALOGUE[kind].size for kind in street.kinds]).reshape(-1, 3)
@@ -265,7 +265,7 @@ class _StreetBodies:
         return near
 
     def _strew(self, sensor: Frame) -> None:
-        """Let clutter in that has come near. What was near once stays."""
+        """Let clutter in that has come near. Clutter that was near once stays."""
         waiting = []
         for kind, pose in self._clutter:
             x, y, _ = pose

@@ -171,7 +171,7 @@ def of_seeds(configs: Sequence[EpisodeConfig], seeds: Sequence[int]) -> list[Epi
     made.
     """
     check_size(len(configs) * len(seeds))
-    # What is sound for one seed is sound for all, so that only the seed is checked.
+    # A configuration that is sound for one seed is sound for all, so only the seed is checked.
     for seed in seeds:
         check_seed(seed)
     own = [int(seed) for seed in dict.fromkeys(seeds)]

@@ -127,8 +127,8 @@ class VehicleWatch(gymnasium.Wrapper[Observed, Action, Observed, Action]):
             self._counts[name] += int(number)
 
     def _note_evidence(self, loop: OneWorld) -> None:
-        """Note the age of the pictures. Of the boxes taken before a turn, count those whose wedge
-        holds the centre of their object, with and without compensation.
+        """Note the age of the pictures. Count the boxes taken before a turn whose wedge holds the
+        centre of their object, with and without compensation.
 
         A box counts as turned if the car has since turned by at least a column: compensation does
         not move others.

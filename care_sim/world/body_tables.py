@@ -251,7 +251,7 @@ def polyhedron(shape: str, size: tuple[float, float, float]) -> Mesh:
 
     corners = _corners(shape, np.array(size))
     hull = ConvexHull(corners)
-    # Qhull gives triangles. Those of one face have one equation, up to the last bits, and two
+    # Qhull gives triangles. Triangles of one face have one equation, up to the last bits, and two
     # triangles that meet on an edge of the polyhedron have different ones.
     equations, number = np.unique(np.round(hull.equations, SAME_FACE), axis=0, return_inverse=True)
     mine = np.repeat(number, hull.neighbors.shape[1])

@@ -4,7 +4,7 @@ traffic of a street with bends and side streets is a flow per lane, laid along i
 The model (Treiber, Hennecke and Helbing 2000), its numbers and its order of operations are those of
 highway-env's `IDMVehicle`, which `care_sim.world.traffic` asks vehicle by vehicle. Where nobody
 changes lanes the motion is the same to the last bit, and a whole street costs less than one vehicle
-there. One rule is ours: a driver who comes to rest stays there. Those of highway-env roll back at
+there. One rule is ours: a driver who comes to rest stays there. Drivers of highway-env roll back at
 some cm/s.
 """
 

@@ -29,8 +29,8 @@ _NEAR_LANE_M = 1.0
 
 class LaneKeeper(NamedTuple):
     """A vehicle that goes straight along x in the middle of its lane: `x`, speed and an IDM
-    driver's wanted speed. Of the lane: its middle y, its start, and the half width within which
-    highway-env counts vehicles as in the lane. Metres and m/s, highway-env's axes.
+    driver's wanted speed. The lane is given by its middle y, its start, and the half width within
+    which highway-env counts vehicles as in the lane. Metres and m/s, highway-env's axes.
     """
 
     x: float

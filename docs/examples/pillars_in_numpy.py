@@ -1,4 +1,4 @@
-"""What runs the network of `pillars` fastest on one core: PyTorch, NumPy or numba.
+"""Time the network of `pillars` on one core with PyTorch, NumPy and numba.
 
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python docs/examples/pillars_in_numpy.py
 
@@ -22,8 +22,8 @@ SCANS = 10
 
 
 class InNumpy:
-    """What the layers do, as `care_sim.perception.pillars.network.Fixed`: each window a row, and
-    one product of matrices a layer.
+    """The layers of `care_sim.perception.pillars.network.Fixed`: each window is a row, and each
+    layer is one product of matrices.
     """
 
     def __init__(self, arrays: dict[str, Any]):

@@ -43,7 +43,7 @@ def thinned(cloud, _, rng):
 
 
 def bunched(cloud, annotations, _):
-    """Of each object the quarter of the returns that is nearest to its middle."""
+    """The quarter of each object's returns that is nearest to its middle."""
     kept = cloud.objects == NO_OBJECT
     for number, box in zip(annotations.objects, annotations.boxes, strict=True):
         rows = np.flatnonzero(cloud.objects == number)

@@ -16,5 +16,5 @@ class SuiteStreets(Streets):
     kind = "suite-streets"
 
     def seeds(self):
-        """Those of the suite, the first 20."""
+        """The first 20 seeds of the suite."""
         return range(200, 220)

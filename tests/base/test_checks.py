@@ -1,4 +1,4 @@
-"""What no argument may be: every number, name and array from outside is refused in one line, where
+"""Refused arguments: every wrong number, name and array from outside is refused in one line, where
 it enters."""
 
 from dataclasses import dataclass, fields
@@ -76,14 +76,14 @@ BOUNDED = [
         *SCENARIOS.values(),
     )
     for field in fields(kind)
-    # Those of r157 that are None by default depend on each other: they have tests of their own.
+    # Numbers of r157 that are None by default depend on each other: they have tests of their own.
     if "bounds" in field.metadata and field.default is not None
 ]
 
 
 STATED = {"lidar_stated_range_m": 40.0}
 ALONG = dict.fromkeys(("lidar_stated_reflectance", "visibility_m", "rain_mm_h"), STATED)
-"""What a number has no meaning without."""
+"""Settings without which a number has no meaning."""
 
 
 @pytest.mark.parametrize(("kind", "name"), BOUNDED, ids=lambda it: getattr(it, "__name__", it))

@@ -90,8 +90,8 @@ def forked():
 
 @pytest.fixture
 def outer(tmp_path, forked):
-    """What the kernel `outer`, which calls one of another file that adds a number, gives for 1 in a
-    new process, and how often its kept code was used.
+    """The answer of the kernel `outer` for 1 in a new process, and how often its kept code was
+    used. The kernel calls one of another file that adds a number.
     """
     (tmp_path / "outer_kernels.py").write_text(dedent(OUTER))
 
@@ -138,8 +138,8 @@ print(shifted(data.{name}(1, 2)), sum(shifted.stats.cache_hits.values()))
 
 @pytest.fixture
 def shifted(tmp_path, forked):
-    """What a kernel gives that adds an imported constant to a field of an imported named tuple, and
-    how often its kept code was used.
+    """The answer of a kernel that adds an imported constant to a field of an imported named tuple,
+    and how often its kept code was used.
     """
 
     def run(name, shift):

@@ -1,4 +1,4 @@
-"""Whose code an error was raised in."""
+"""The owner of the code that raised an error."""
 
 import site
 import sysconfig

@@ -187,7 +187,7 @@ print(os.environ["HOME"], os.environ["XDG_CACHE_HOME"], matplotlib.get_cachedir(
 
 
 def as_nobody(program, folder, **environment):
-    """What a program prints under a user number without a name, in a folder of its own."""
+    """The output of a program under a user number without a name, in a folder of its own."""
     if os.geteuid():
         pytest.skip("only root may take another user's number")
     folder.chmod(0o777)

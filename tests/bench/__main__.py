@@ -71,7 +71,7 @@ def bench_report(settings, tell=lambda _what: None):
         "versions": versions(),
         "main": MAIN,
     }
-    # What runs in several threads or processes needs the other cores.
+    # Measurements in several threads or processes need the other cores.
     tell("batches")
     report["batches"] = vectors.batches(settings)
     tell("learning")
@@ -120,7 +120,7 @@ def one_core():
 
 def ratios(report):
     """Ratios of medians within this run by name, larger being better: a ratio varies less between
-    machines than the times. What was not measured here has none.
+    machines than the times. Figures that were not measured here have no ratio.
     """
     many, more = row(1), row(2)
     # Per second on the core, so that what else runs on it does not favour one side. Two processes
@@ -159,7 +159,7 @@ def ratios(report):
 
 
 def lines(report):
-    """What is printed: a line per figure, medians with the least and the most."""
+    """The lines to print: one per figure, medians with the least and the most."""
     where = report["machine"]
     yield f"{where['processor']}, {where['cores']} cores, {where['system']}"
     yield ", ".join(f"{name} {number}" for name, number in report["versions"].items())

@@ -1,4 +1,4 @@
-"""What casts rays at the same moving bodies: our engines, and known ones beside them.
+"""Casters of rays at the same moving bodies: our engines, and known ones beside them.
 
 A caster has `place(poses)`, which moves all bodies, (n, 3) as x, y, heading, and
 `cast(sensor, cells)`, which gives ranges (n,) in metres, inf without a hit, and body ids (n,), -1

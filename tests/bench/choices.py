@@ -40,8 +40,8 @@ def _round(policy, observations, samples):
 
 
 def observation(rig, seed):
-    """What the environments show of `TRACKS` tracked bodies and `UNTRACKED` others around the
-    sensor.
+    """The observation that environments show of `TRACKS` tracked bodies and `UNTRACKED` others
+    around the sensor.
     """
     rng = np.random.default_rng(seed)
     bodies = moving_bodies(TRACKS + UNTRACKED, seed)

@@ -1,4 +1,4 @@
-"""What is measured, and for how long: steps and constructions per second of the environments, and
+"""The measurements and their lengths: steps and constructions per second of the environments, and
 of known ones beside them; steps of two processes.
 """
 

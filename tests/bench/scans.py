@@ -93,7 +93,7 @@ def laps(made, bodies, cells, samples):
 
 
 def growth(settings):
-    """Of every axis its `values` (of the grid, cells), `labels` for people and, for every engine,
+    """The `values` of every axis (of the grid, cells), `labels` for people and, for every engine,
     `ms`: the median time of a scan with poses.
 
     Every round goes through all points, so that what else the machine does falls on all alike. A

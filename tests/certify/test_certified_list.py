@@ -1,5 +1,5 @@
-"""What the list of the certificate holds: all that can meet, and every argument but those that are
-left out for a reason.
+"""The list of the certificate holds all that can meet, and every argument but those that are left
+out for a reason.
 """
 
 from dataclasses import fields

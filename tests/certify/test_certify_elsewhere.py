@@ -30,8 +30,8 @@ def played(folder):
 
 @pytest.mark.slow
 def test_a_processor_of_fewer_features_plays_most_episodes_as_published(tmp_path, pytestconfig):
-    """That this processor plays them as published is tested for 28 of them in `test_certify.py`;
-    `care-sim certify` plays every episode of the list.
+    """`test_certify.py` tests for 28 of them that this processor plays them as published; `care-sim
+    certify` plays every episode of the list.
     """
     line = (
         "import json; from tests.certify import test_certify_elsewhere as t; "

@@ -19,7 +19,7 @@ def here(tmp_path, monkeypatch):
 
 @pytest.fixture
 def sweep(capsys):
-    """What a short sweep prints, and complains of."""
+    """The output and the complaints of a short sweep."""
 
     def run(options, code=0):
         with pytest.raises(SystemExit) as end:

@@ -20,7 +20,7 @@ SHORT = ("--scenario-parameters", "duration_s=0.3")
 
 
 def hash_of(out):
-    """Of the episode whose timeline was printed."""
+    """The hash of the episode whose timeline was printed."""
     return re.search(r"^episode_hash +(\S+)$", out, re.MULTILINE)[1]
 
 
@@ -48,7 +48,7 @@ def test_it_plays_where_the_agent_learned_and_with_its_conditions(capsys, mine):
         assert code == 0
         assert hash_of(out) == wanted
         assert complaint == "care-sim: played without what no command takes: keyframe_s\n"
-    # What is given wins over what was learned with.
+    # Given options win over those of the training.
     given = ("--lidar-dropout", 0.1, *SHORT)
     other = [*line.split(), *given]
     assert hash_of(run(capsys, "run", mine, *given, "--seed", 2)[1]) == hash_of(

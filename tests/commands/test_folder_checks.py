@@ -26,7 +26,7 @@ from tests.helpers.made_rows import STUDY, rows
 
 SHORT = (("duration_s", 0.1),)
 NOTES = (JOURNAL, UNFINISHED)
-"""What a study leaves of how far it is."""
+"""Files in which a study notes its progress."""
 PAPER, SWEEP = STUDIES["paper"], STUDIES["sweep"]
 
 
@@ -223,7 +223,7 @@ def test_made_rows_are_of_the_same_identity_as_played_ones(tmp_path):
 
 
 def test_every_parameter_is_a_column_that_is_read():
-    """What a reader drops is no part of what a row was asked with."""
+    """A column that a reader drops is no part of a row's configuration."""
     known = {kind.file: {*kind.schema.needed, *kind.schema.further} for kind in RESULTS_FORMATS}
     assert {*PLAIN_FIELDS} <= known[EPISODES.file]
     # A film has its own times: the period of a keyframe is one of the closed loop.

@@ -26,7 +26,7 @@ def test_detectors_are_judged_told_and_not_replaced(drive, tmp_path, capsys):
     assert told["conditions"]["source"] == "argoverse2"
     assert told["conditions"]["lidar_dropout"] == 0.1
     sums = told["detectors"]["returns"]["from score"]["0"]
-    # What the proxy reports it has the true boxes of.
+    # The proxy reports true boxes.
     assert sums["right"] == sums["boxes"] == sums["found"] > 0
     assert told["detectors"]["cluster"]["from score"]["0.2"]["boxes"] > 0
     assert told["detectors"]["cluster"]["scan_ms"] > 0

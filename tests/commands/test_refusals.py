@@ -1,4 +1,4 @@
-"""What a command does not take is one line, before anything is played."""
+"""A command refuses bad input in one line, before anything is played."""
 
 import re
 import shlex

@@ -19,7 +19,7 @@ MADE_HERE = [level for level in FILM_CONDITIONS if not {*level.changes} & {*RETU
 
 @pytest.fixture
 def played(capsys, tmp_path):
-    """What a study printed, its rows, and what a report of them alone prints."""
+    """The output of a study, its rows, and the output of a report of them alone."""
 
     def play(line, code=0):
         out = tmp_path / "out"
@@ -31,7 +31,7 @@ def played(capsys, tmp_path):
 
 
 def again(capsys, out):
-    """What a report prints that writes the tables and figures again, the same ones."""
+    """The output of a report that writes the tables and figures again, the same ones."""
     names = {"tables.md", "tables.tex"} | {path.name for path in out.glob("*.svg")}
     before = {name: (out / name).read_bytes() for name in names}
     for name in names:

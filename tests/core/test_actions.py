@@ -31,7 +31,9 @@ DEMAND = Demand([np.array([0, 1, 2, 3, 4])], [[np.array([2, 3])]])
 
 
 def shares(demand, behind, rig=RIG):
-    """Of the cells that `demand` fires; `behind` is the demand that the watcher believes in."""
+    """The shares of the cells that `demand` fires; `behind` is the demand that the watcher believes
+    in.
+    """
     action = scores_of(allocate(demand, rig.budget, rig.reserve_fraction), rig.grid.shape)
     return shares_of(fired_cells(action, rig.budget, DRAWN), action, behind, rig)
 
@@ -90,7 +92,7 @@ def test_what_fires_along_has_the_share_of_the_first_of_its_unit():
 
 
 def test_what_a_window_fires_unasked_is_no_floor():
-    """Of the columns 1 and 2 the demand names a cell of the first."""
+    """The demand names a cell of the first of the columns 1 and 2."""
     rig = replace(RIG, firing="azimuth-window:180", budget=6)
     demand = Demand(layers=[[np.array([5])]])
     action = scores_of(np.array([5]), RIG.grid.shape)

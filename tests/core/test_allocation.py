@@ -169,7 +169,7 @@ def test_what_is_no_demand_is_refused_in_one_line(demand):
 
 
 def test_worlds_round_a_half_share_up_as_one_does():
-    """Of 5 cells a reserve of a half leaves 3 to exploitation, not the even 2."""
+    """With 5 cells a reserve of a half leaves 3 to exploitation, not the even 2."""
     rig = Rig(budget=5, reserve_fraction=0.5)
     hulls, wedges = np.arange(10), np.arange(50, 60)
     alone = allocate(Demand([hulls], [[wedges]]), 5, 0.5)

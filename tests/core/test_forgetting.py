@@ -123,7 +123,7 @@ def test_a_track_needs_two_frames_before_it_can_be_forgotten(tracks_at):
         ([], [], 0),
         ([[1, 2, 3], [7, 8]], [[1, 2, 3], [7, 8]], 0),
         ([[1, 2, 3], [7, 8]], [[7, 8], [2]], 2),
-        # What another hull holds on to is not released, and nothing is released twice.
+        # Cells of another hull are not released, and nothing is released twice.
         ([[1, 2, 3], [3, 4]], [[2], [3, 4]], 1),
         ([[1, 2], [2, 3]], [], 3),
         # Sets may ask for more than the hulls.

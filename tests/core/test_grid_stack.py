@@ -178,7 +178,7 @@ def test_a_camera_near_the_lidar_counts_as_standing_at_it():
 
 
 def test_wedges_keep_the_order_of_their_boxes():
-    """Of two cameras one stands at the LiDAR."""
+    """One of the two cameras is at the LiDAR."""
     cameras = PinholeCamera(), PinholeCamera(position=(2.0, 0.0, 0.0))
     spans = [(10.0 * n, 80.0, 10.0 * n + 30, 120.0) for n in range(4)]
     both = detection(spans)

@@ -26,7 +26,7 @@ def errors(keyframes, seed=0, **spreads):
 
 
 def correlation(of, keyframes):
-    """Of a series with itself so many keyframes later."""
+    """The correlation of a series with itself so many keyframes later."""
     return float(np.corrcoef(of[:-keyframes], of[keyframes:])[0, 1])
 
 

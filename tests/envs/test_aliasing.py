@@ -1,4 +1,4 @@
-"""What an environment hands out or is handed belongs to the caller, who may write into it."""
+"""Arguments and results of an environment belong to the caller, who may write into them."""
 
 import gymnasium
 import numpy as np
@@ -43,8 +43,8 @@ def scrawl(*given):
 
 
 def played(env, touch, inner=lambda _: None):
-    """What is seen and fired; `touch` gets all that changed hands, before each keyframe and after
-    it.
+    """All that is seen and fired; `touch` gets all that changed hands, before each keyframe and
+    after it.
     """
     rng = np.random.default_rng(0)
     told = []

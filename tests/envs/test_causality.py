@@ -1,4 +1,4 @@
-"""What no fired ray touches and no camera sees cannot reach an observation."""
+"""An observation shows nothing that no fired ray touches and no camera sees."""
 
 import gymnasium
 import numpy as np

@@ -1,4 +1,4 @@
-"""What every environment keeps to, read off one episode of each that is played once."""
+"""Rules that every environment keeps, read off one episode of each that is played once."""
 
 import re
 from dataclasses import fields
@@ -17,7 +17,7 @@ from tests.helpers.episodes import played
 
 SEED = 3
 OWN = {"fired", "time_s"}
-"""What a car knows of `info`; in the closed loop also `braking`."""
+"""Keys of `info` that a car knows; in the closed loop also `braking`."""
 SOMETIMES = {"intensities", "times_s"}
 """Not every return has strength and an instant."""
 

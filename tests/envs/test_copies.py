@@ -123,7 +123,7 @@ def test_a_detector_is_copied_with_what_it_remembers(copied, made, tmp_path):
         last = [each.unwrapped.loop.keyframe(np.arange(16384)).reported for each in (one, one, two)]
         places = [each.boxes[0, 0] for each in last]
         assert places[1] > places[0] == places[2]
-        # What is only of the last keyframe stays behind.
+        # Data of the last keyframe alone is not copied.
         assert len(one.unwrapped.loop.handed) > len(copied(one).unwrapped.loop.handed) == 0
 
 

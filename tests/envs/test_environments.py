@@ -88,7 +88,7 @@ def test_policies_meet_the_same_floor_world_and_misses():
 
 
 def floors(seed, *actions):
-    """What fires at three keyframes without a score, after the keyframes of `actions`."""
+    """The cells that fire at three keyframes without a score, after the keyframes of `actions`."""
     env = make("CARE-Dartout-v0", budget=0.01)
     env.reset(seed=seed)
     for action in actions:

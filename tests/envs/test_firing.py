@@ -1,4 +1,4 @@
-"""What every hardware keeps to in every loop, whoever plays."""
+"""Rules that every hardware keeps in every loop, whoever plays."""
 
 import gymnasium
 import numpy as np
@@ -44,7 +44,7 @@ def test_every_policy_fires_whole_units_of_the_budget(loop, firing):
                 assert shots.max() <= hardware.most_shots
                 sizes = np.bincount(hardware.unit_of[cells])
                 assert {*sizes.tolist()} <= {0, hardware.unit_cells}
-                # What fired has a range or reached nothing; all else was not fired.
+                # Fired cells have a range or reached nothing; all others were not fired.
                 assert np.array_equal(np.flatnonzero(observation["ranges"].ravel()), cells)
 
 

@@ -1,4 +1,4 @@
-"""What an agent must not know: episodes looked up by their seed."""
+"""Knowledge that an agent must not have: episodes looked up by their seed."""
 
 import gymnasium
 import numpy as np

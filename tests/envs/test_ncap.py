@@ -57,7 +57,8 @@ def test_a_drawn_test_is_told_to_the_scoring_and_its_world_is_that_test():
         same, told = env.reset(seed=4)
         assert poses == [actor.pose_at(1.0) for actor in env.unwrapped.loop.world.actors]
     np.testing.assert_equal(begun, same)
-    # What is given is not drawn, and what the seed drew is no one else's.
+    # Given parameters are not listed as drawn, and drawn ones are not shown without scoring
+    # information.
     assert told == {"seed": 4}
     with make(budget=0.03, test="drawn", speed_kph=0, scoring_info=False) as env:
         assert env.reset(seed=4)[1] == {}

@@ -1,4 +1,4 @@
-"""What every switch of the returns keeps to in every loop."""
+"""Rules that every switch of the returns keeps in every loop."""
 
 import gymnasium
 import numpy as np

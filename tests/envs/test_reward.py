@@ -81,9 +81,7 @@ def test_a_weight_is_changed_by_name_and_the_rest_stays():
 
 
 def losses(*frames):
-    """What is lost at keyframes of (distance, whether a full scan detects, whether it was
-    detected).
-    """
+    """The losses at keyframes of (distance, whether a full scan detects, whether detected)."""
     rewards = Rewards(weights({"gain": 1.0}), 1)
     last = len(frames) - 1
     terms = [

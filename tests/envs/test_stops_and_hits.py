@@ -1,4 +1,4 @@
-"""What a stop avoids, and whom a collision is with, in worlds made by hand."""
+"""Collisions that a stop avoids, and whom a collision is with, in worlds made by hand."""
 
 from contextlib import closing
 from dataclasses import dataclass

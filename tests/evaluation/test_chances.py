@@ -96,7 +96,7 @@ def test_other_detectors_have_no_chances(detector):
 
 
 def test_expected_counts_are_sums_over_the_kinds_of_newcomers():
-    """Of four newcomers the bus comes from beyond the range; the other three emerge."""
+    """The bus, one of four newcomers, comes from beyond the range; the other three emerge."""
     with FilmEnv(handmade_film(), floor=False) as env:
         env.reset(seed=0)
         while not env.loop.over:

@@ -1,4 +1,4 @@
-"""What a detector's boxes are worth, worked by hand, and what holds of any reports."""
+"""The worth of a detector's boxes, worked by hand, and rules that hold of any reports."""
 
 import numpy as np
 import pytest

@@ -139,7 +139,7 @@ def served(demand, budget, rho=0.3, floor=None):
 
 
 def test_every_share_of_a_hull_a_wedge_and_a_floor_by_hand():
-    """Of ten cells exploitation may take seven, but asks for two; the wedge takes three, of which
+    """Exploitation may take seven of ten cells, but demands two. The wedge takes three, of which
     the hull had one; the floor begins with the cells 20 and 21. The object returns twice in 5.
     """
     demand = Demand([cells(1, 2)], [[cells(2, 5, 6, 7)]])
@@ -180,8 +180,8 @@ def test_rays_that_fire_along_are_credited_to_the_stage_that_their_unit_fired_fo
 
 
 def test_a_reserve_that_is_filled_by_hand():
-    """Of 10 cells exploitation takes 4 of its 7. U asks for 7, one of them a hull cell, and gets
-    the 6 that are left. Of M two cells lie outside U, and one of these the hull has.
+    """With 10 cells exploitation takes 4 of its 7. U asks for 7, one of them a hull cell, and gets
+    the 6 that are left. M has two cells outside U, and the hull has one of these.
     """
     unexplained = [cells(3, 10, 11, 12), cells(13, 14, 15)]
     by_memory = [cells(2, 10), cells(20, 11)]

@@ -60,7 +60,7 @@ def test_the_count_that_is_last_is_the_score():
 
 
 def test_every_object_weighs_alike():
-    """Of 9 in a world all are detected and of 1 in another none: 90% of 10."""
+    """All of 9 objects in one world and none of 1 in another are detected: 90% of 10."""
     got = np.array([np.full((7, 1), 9.0), np.zeros((7, 1))])
     part = PartCounts(("kept",), got, np.array([[9.0], [1.0]]))
     assert shares([part]).tolist() == [[0.9]] * 7
@@ -148,7 +148,7 @@ def test_a_ratio_is_paired():
     ratio, low, high = budget_ratio(late, [good])
     assert ratio == pytest.approx(1.5, rel=0.06)
     assert 1.3 < low <= ratio <= high < 1.7
-    # What differs between worlds widens the interval of each alone, and not that of the ratio.
+    # Differences between worlds widen the interval of each alone, and not that of the ratio.
     ours, theirs = smallest_budget(late), smallest_budget([good])
     assert (high - low) < 0.5 * (ours.high / theirs.low - ours.low / theirs.high)
     assert budget_ratio([good], [good]) == (1.0, 1.0, 1.0)

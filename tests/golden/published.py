@@ -27,8 +27,8 @@ NOT_RECOMPUTED = {
     "judge-logs": "its tables need every box of the detectors; the folder holds their counts",
     "judge-streets": "its tables need every box of the detectors; the folder holds their counts",
 }
-"""Published folders without numbers here, and why. What `bench` and `parity` measured is in files
-beside the folders; no command prints such a file again.
+"""Published folders without numbers here, and why. The measurements of `bench` and `parity` are in
+files beside the folders; no command prints such a file again.
 """
 SENTENCES = "Closing sentences"
 

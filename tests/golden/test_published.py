@@ -32,7 +32,7 @@ def translated(cell):
 
 def differing(golden, now):
     """The golden cells that no cell of today is equal to, then those of today that are in a golden
-    table and not golden. Of tables that both sides have the titles are compared, too.
+    table and not golden. The titles of tables that both sides have are compared, too.
     """
     golden = [cell for cell in map(translated, golden) if cell]
     both = {cell.title for cell in golden} & {cell.title for cell in now}

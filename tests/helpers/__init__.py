@@ -1,1 +1,1 @@
-"""What several tests make: logs, databases, rows, processes."""
+"""Helpers that several tests share: logs, databases, rows, processes."""

@@ -43,7 +43,7 @@ class Marked:
         self.process.communicate()
 
     def alive(self):
-        """Those that run, the process itself included."""
+        """The processes that run, the process itself included."""
         return marked(self._mark)
 
     def all_end_within(self, seconds):
@@ -73,7 +73,9 @@ def until(condition, seconds):
 
 
 def listen_to_interrupts():
-    """What is started in the background, as the tests may be, inherits deaf ears."""
+    """A process that is started in the background, as the tests may be, inherits ignored
+    interrupts.
+    """
     for number in INTERRUPTS:
         signal.signal(number, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_SETMASK, [])

@@ -1,4 +1,4 @@
-"""What an owner of nuScenes has who types the commands of the page "Your detector"."""
+"""The files of an owner of nuScenes who types the commands of the page "Your detector"."""
 
 import os
 import re
@@ -38,7 +38,7 @@ def write_belongings(folder, scenes):
 
 
 def typed(command, folder):
-    """What a command prints, typed in a folder. The command must succeed."""
+    """The output of a command, typed in a folder. The command must succeed."""
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     done = subprocess.run(
         command, shell=True, cwd=folder, env=os.environ | {"PATH": path}, capture_output=True,

@@ -1,4 +1,4 @@
-"""What figures show, read back from their axes."""
+"""The content of figures, read back from their axes."""
 
 
 def heights(axes):

@@ -6,7 +6,7 @@ import care_sim
 
 
 def played(env, policy="care", seed=0, keyframes=None):
-    """What `reset` and every step gave, to the end of the episode or for so many keyframes; as
+    """The results of `reset` and every step, to the end of the episode or for so many keyframes; as
     steps: the reset has the reward 0. A `policy` that is None scores nothing.
     """
     nothing = np.zeros(env.action_space.shape, np.float32)

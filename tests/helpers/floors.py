@@ -44,7 +44,7 @@ def floor_order(floor, size):
     while True:
         cells = drawn_cells(floor, size, batches)
         first = np.full(size, len(cells))
-        # Of several places of a cell the one written last stays.
+        # If a cell has several places, the one written last stays.
         first[cells[::-1]] = np.arange(len(cells))[::-1]
         if first.max() < len(cells):
             return np.argsort(first)

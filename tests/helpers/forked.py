@@ -88,7 +88,7 @@ class Forked:
         self._server.communicate()
 
     def run(self, code, folder):
-        """What came of the code as the main program, `folder` being its working folder."""
+        """The result of the code as the main program, `folder` being its working folder."""
         printed = {name: folder / f".{name}" for name in ("out", "err")}
         asked = json.dumps(
             {"code": code, "folder": str(folder)}

@@ -1,8 +1,9 @@
 """A film made by hand: a car that stands still meets five objects.
 
-Whoever fires at the image boxes finds the car AHEAD and the BUS at the first keyframe and the
-WALKER at the second. At the third appear BESIDE, a car whose image box holds the centre of the one
-ahead, and BEHIND, a person whom no camera shows; and the bus, until then farther than 50 m, enters.
+A policy that fires at the image boxes detects the car AHEAD and the BUS at the first keyframe and
+the WALKER at the second. At the third appear BESIDE, a car whose image box holds the centre of the
+one ahead, and BEHIND, a person whom no camera shows; and the bus, until then farther than 50 m,
+enters.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""What PointRCNN reported in the drives of KITTI in shared/data, object by object."""
+"""Reports of PointRCNN in the drives of KITTI in shared/data, object by object."""
 
 import math
 from dataclasses import replace
@@ -15,7 +15,7 @@ from care_sim.sources.kitti import FRAMES_PER_KEYFRAME, KITTI_CATEGORIES, Kitti
 from tests.helpers.nuscenes_reports import OBJECT
 
 COLUMNS = 540
-"""Of the 2,083 of a whole turn, those before the car: the picture is 81 degrees wide."""
+"""The columns before the car, of the 2,083 of a whole turn: the picture is 81 degrees wide."""
 
 
 @cache
@@ -48,7 +48,7 @@ def _front():
 
 
 def _detections(rows):
-    """Those of rows (n, 14): class, then what a line of the file holds."""
+    """The detections of rows (n, 14): class, then the numbers of a line of the file."""
     rows = np.array(rows, float).reshape(-1, 14)
     boxes = np.zeros((len(rows), 7))
     # From the camera (x right, z ahead) to the LiDAR, 0.27 m behind it.

@@ -13,7 +13,7 @@ STRATA = {
     "class": ("car", "truck", "bus", "bicycle", "pedestrian"),
     "entry": ("emergence", "ring", "beyond"),
 }
-"""Of entries only those that events have; every object frame is of an event here."""
+"""The entries are only those that events have; every object frame is of an event here."""
 TAGS = {
     "history-oracle": "privileged",
     "random-points": "non-causal",

@@ -5,7 +5,7 @@ import numpy as np
 from care_sim.core.frames import turned
 
 HEIGHT = 1.84
-"""Of the sensor above the road, metres."""
+"""Height of the sensor above the road, metres."""
 
 
 def face(start, end, low, high, step=0.1):

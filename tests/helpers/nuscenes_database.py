@@ -14,8 +14,8 @@ CAM_BACK_LEFT   1.03569 0.4848 1.59097 0.6924186 -0.7031619 -0.1164834 0.1120332
 CAM_BACK_RIGHT  1.01488 -0.48057 1.5624 0.1228098 -0.1324008 -0.7004306 0.690496 1259.514 807.253 501.196
 CAM_BACK        0.02833 0.00345 1.5791 0.5037873 -0.4974025 -0.494185 0.5045496 809.221 829.22 481.778
 """  # noqa: E501
-"""Of every sensor x, y, z and the quaternion w, x, y, z in the car's frame; of cameras the focal
-length and the principal point, too.
+"""Every sensor has x, y, z and the quaternion w, x, y, z in the car's frame; cameras also have the
+focal length and the principal point.
 """
 
 
@@ -49,7 +49,7 @@ LEVELS = {"1": "v0-40", "2": "v40-60", "3": "v60-80", "4": "v80-100"}
 
 
 START_US = 1_532_402_927_000_000
-"""Of the first sample, microseconds."""
+"""Time of the first sample, microseconds."""
 
 
 def annotated(

@@ -9,7 +9,7 @@ SPLIT = {"scene-0103": 0.0, "scene-0916": 2.2}
 """The heading of each drive; both are scenes of the official validation split."""
 KEYFRAMES = 5
 SPEED = 4.0
-"""Of the car, metres a keyframe."""
+"""Speed of the car, metres per keyframe."""
 SIZES = {
     "car": (1.9, 4.6, 1.7),
     "truck": (2.5, 7.0, 2.9),

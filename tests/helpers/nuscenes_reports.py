@@ -1,4 +1,4 @@
-"""What a real detector reported in the two scenes of nuScenes in shared/data, object by object."""
+"""Reports of a real detector in the two scenes of nuScenes in shared/data, object by object."""
 
 import csv
 import json

@@ -14,7 +14,7 @@ SAMPLES = 40
 BOXES = 35
 INSTANCES = 76
 RECORDINGS = 11
-"""Of each sensor at every sample; the first is the keyframe."""
+"""Recordings of each sensor per sample; the first is the keyframe."""
 NAME = "scene-0001"
 PLACE = (411.3039349319818, 1180.8903791765097)
 BESIDE = (419.3039349319818, 1182.8903791765097, 0.95)

@@ -84,7 +84,7 @@ class DatasetTemplate:
 
 
 class Settings(dict):
-    """Of the interface of EasyDict."""
+    """Settings with the interface of EasyDict."""
 
     def __getattr__(self, name):
         if name in self:

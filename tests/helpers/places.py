@@ -11,7 +11,7 @@ EXAMPLES = ROOT / "docs" / "examples"
 README = ROOT / "README.md"
 SITE = sorted(page for page in (ROOT / "docs").rglob("*.md") if not page.is_symlink())
 RESULTS = sorted((ROOT / "results").glob("*.md"))
-"""Those of the results that are written, not made: `tables.md` lie in the folders."""
+"""The pages of results that are written, not made: `tables.md` are in the folders."""
 SHIPPED = sorted((ROOT / "care_sim").glob("*/*/shipped/README.md"))
 PAGES = [README, ROOT / "CONTRIBUTING.md", *SHIPPED, *RESULTS, *SITE]
 

@@ -1,8 +1,8 @@
-"""What a policy saw, asked for and fired over the first keyframes of an episode."""
+"""The observations, actions and fired cells of a policy over the first keyframes of an episode."""
 
 
 def played(env, policy, keyframes):
-    """Of each keyframe the observation, the action and the fired cells, of seed 0."""
+    """The observation, the action and the fired cells of each keyframe, of seed 0."""
     observation, _ = env.reset(seed=0)
     policy.reset()
     for _ in range(keyframes):

@@ -13,8 +13,8 @@ GROUPS = ("X86_V3", "X86_V4", "AVX512_ICL", "AVX512_SPR")
 
 
 def reduced(code=None):
-    """What a child process is given; with a folder for `code`, numba compiles for a processor of
-    fewer features too. Skips the test where there is nothing to leave out.
+    """The environment variables of a child process; with a folder for `code`, numba compiles for a
+    processor of fewer features too. Skips the test where there is nothing to leave out.
     """
     present = [name for name in GROUPS if __cpu_features__.get(name)]
     if "X86_V4" not in present:

@@ -3,7 +3,7 @@
 import numpy as np
 
 HEIGHT_M = 1.84
-"""Of the LiDAR of the default set-up above the road; it is mounted 0.445 m behind the middle."""
+"""Height of the default set-up's LiDAR above the road; it is mounted 0.445 m behind the middle."""
 SPEED_MPS = 6.0
 START_NS = 1_700_000_000_000_000_000
 STEP_NS = 100_000_000

@@ -10,7 +10,7 @@ from scipy.stats import rankdata
 from care_sim.core.types import CLASSES
 
 BOXES = 300
-"""Of each kind, to learn from and as many to be tested on."""
+"""Boxes of each kind to learn from, and as many to be tested on."""
 CHANCE = 0.07
 """How far from 0.5 the area under the curve may be: for n boxes of each kind that nothing tells
 apart its standard error is 1 / sqrt(6 n) = 0.024 (Hanley and McNeil 1982); this is three of them,
@@ -19,8 +19,8 @@ for the farthest of three classifiers.
 
 
 def areas_under_the_curve(true, false, rng):
-    """Of every classifier by name. `true` and `false` are tables of detections, one an episode; the
-    first half of the episodes is learned from, the other tested on.
+    """The area under the curve of every classifier, by name. `true` and `false` are tables of
+    detections, one an episode; the first half of the episodes is learned from, the other tested on.
     """
     half = len(true) // 2
     learned, tested = (

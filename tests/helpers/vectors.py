@@ -23,7 +23,7 @@ def native(name, worlds, **arguments):
 
 
 class _Own(SyncVectorEnv):
-    """Of single environments whose arrays in infos may differ in their lengths."""
+    """Single environments whose arrays in infos may differ in their lengths."""
 
     def _add_info(self, vector_infos, env_info, env_num):
         for name, value in env_info.items():
@@ -33,7 +33,9 @@ class _Own(SyncVectorEnv):
 
 
 def singles(name, worlds, mode, **arguments):
-    """Gymnasium's vector of single environments. Of arguments that are lists each takes its own."""
+    """Gymnasium's vector of single environments. Each environment takes its own value of arguments
+    that are lists.
+    """
     own = {name: arguments[name] for name in OF_EACH_WORLD if isinstance(arguments.get(name), list)}
     each = [
         arguments | {name: values[world] for name, values in own.items()} for world in range(worlds)

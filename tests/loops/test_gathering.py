@@ -1,5 +1,5 @@
-"""What a detector is given of several sweeps, in a film and in the closed loop, and what becomes a
-track.
+"""Points of several sweeps that a detector is given, in a film and in the closed loop, and reports
+that become tracks.
 """
 
 from dataclasses import replace
@@ -90,7 +90,7 @@ def test_the_closed_loop_gathers_as_many_sweeps_as_are_asked_for():
     frames = [Frame(float(n), 0.0, HEIGHT, 0.0) for n in range(4)]
     for n, frame in enumerate(frames):
         seen = gathering.add(cloud(10.0 - n), frame)
-    # What stands at 10 m in the world is 7 m ahead in each of the last three.
+    # A point that stands at 10 m in the world is 7 m ahead in each of the last three.
     assert seen.points[:, 0] == pytest.approx([7.0, 7.0, 7.0])
     assert sorted(seen.times) == pytest.approx([-0.2, -0.1, 0.0])
     assert [pose.lag_s for pose in seen.poses] == pytest.approx([0.0, 0.1, 0.2])

@@ -48,7 +48,7 @@ def sweep(time_s, cells, sensor, objects=None, ranges=15.0):
 
 
 def played(film, *masks, **sensing):
-    """What the detector was given at each keyframe, and the records."""
+    """The clouds that the detector was given at each keyframe, and the records."""
     listener = Listener()
     seeds = SensorSeeds(*map(np.random.SeedSequence, range(4)))
     loop = OpenLoop(film, RIG, Sensing(**sensing), seeds, listener)

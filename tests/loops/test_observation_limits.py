@@ -1,4 +1,4 @@
-"""What an observation can hold: rows beyond its tables, and numbers that no sensor tells."""
+"""Limits of an observation: rows beyond its tables, and numbers that no sensor tells."""
 
 import numpy as np
 import pytest

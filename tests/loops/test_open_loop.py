@@ -20,7 +20,7 @@ from care_sim.sensors.surround import SURROUND_CAMERAS
 
 RIG = Rig(cameras=SURROUND_CAMERAS, keyframe_s=0.5)
 HEIGHT, OTHER = 1.84, 40
-"""Of the sensor; the number of the other car."""
+"""Height of the sensor; number of the other car."""
 BOX = np.array([20.0, 3.0, 0.86, 4.61, 1.95, 1.72, 0.0])
 WALL = np.array([5, 6, 7])
 NOWHERE = np.array([], np.int64)

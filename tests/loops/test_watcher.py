@@ -1,4 +1,4 @@
-"""What a watcher tells of an episode whose camera errs, and of a film."""
+"""Reports of a watcher on an episode whose camera errs, and on a film."""
 
 from types import SimpleNamespace
 
@@ -43,7 +43,7 @@ def watch(name="CARE-Dense-v0", seed=0, keyframes=30, **conditions):
 
 
 def counts(notes):
-    """Of every keyframe: detections that arrived, false ones among them, missed ones."""
+    """Counts per keyframe: detections that arrived, false ones among them, missed ones."""
     situations = [watched.situation for watched in notes.moments]
     return [
         SimpleNamespace(given=len(s.belief.detections), false=s.false.sum(), missed=len(s.missed))
@@ -145,7 +145,7 @@ def test_what_is_watched_is_how_the_film_stands(drive):
             ego = shot.sensor.boxes_to_local(situation.ego[None])[0]
             assert ego[:2] == pytest.approx([-film.place[0], -film.place[1]], abs=1e-6)
             assert ego[2] - ego[5] / 2 == pytest.approx(-film.sensor_height_m)
-            # Of what the camera showed, each object is either in the belief or missed.
+            # Each object that the camera showed is either in the belief or missed.
             behind = env.loop.true_detected_objects()
             assert (situation.false == (behind < 0)).all()
             given = int((behind >= 0).sum())

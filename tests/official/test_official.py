@@ -39,7 +39,7 @@ def database(tmp_path_factory):
 
 
 def official(database, results, *options):
-    """What the documented command prints and writes."""
+    """Run the documented command and return its output."""
     command = ["make", "official", f"RESULTS={results}", f"DATA={database}", *options]
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
 
@@ -120,7 +120,7 @@ def test_a_full_scan_reaches_the_truth_and_a_starved_one_does_not(tmp_path, data
 
 
 def test_velocities_and_attributes_are_the_detectors_own(tmp_path, database):
-    """What a detector reported, played back under a full scan, scores as it was reported."""
+    """Reports of a detector, played back under a full scan, score as they were reported."""
     results = truth(database)
     told = written(tmp_path / "told.json", results)
     # The same with every velocity turned back.

@@ -85,7 +85,7 @@ def unexplained(report):
 
 
 def lines(report):
-    """What is printed: the counts that are not 0."""
+    """The lines to print: the counts that are not 0."""
     for name, figures in report["scans"].items():
         yield f"{name}: {figures['scans']:,} scans"
         for reference, met in figures["references"].items():

@@ -56,7 +56,7 @@ def keyframes(scenario, episodes, done):
     """
     rays, pictures = RayCounts(), PictureCounts()
     for seed in range(episodes):
-        # What the car drives by decides where the keyframes are.
+        # The policy that the car drives by decides where the keyframes are.
         compare_episode(EpisodeConfig(scenario, "care", 0.1, seed), rays, pictures)
         done(seed + 1)
     return rays, pictures

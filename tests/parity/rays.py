@@ -103,7 +103,8 @@ class RayCounts:
             np.add.at(self.other_ranges[reference], met, gaps > SAME_RANGE_M)
             np.maximum.at(self.widest_m[reference], met, gaps)
 
-        # What neither grazes nor is Bullet's tolerance is listed, for a person to look at.
+        # Differences that are neither grazing rays nor Bullet's tolerance are listed, for a person
+        # to look at.
         strange = np.isin(compared.on_exact, (LOST, UNEXPLAINED)) | (
             compared.on_bullet == UNEXPLAINED
         )

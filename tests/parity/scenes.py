@@ -29,9 +29,9 @@ SCENE_GRIDS = (
 _AIMED, _STRAY = 24, 8
 """Rays of a scene towards points in and just around parts, and rays anywhere."""
 _AROUND = 1.05
-"""Those points lie in the box around a part, made larger by this factor."""
+"""The points lie in the box around a part, made larger by this factor."""
 _UNCLEAR_M = 0.001
-"""What a ray meets that starts so close to a surface, or within a sphere, Bullet leaves open."""
+"""Bullet leaves open what a ray meets that starts so close to a surface, or within a sphere."""
 AWAY = Frame(1000.0, 1000.0, 0.0, 0.0)
 """Where bodies stand that a scene does not use: beyond the reach of every grid."""
 

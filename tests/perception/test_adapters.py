@@ -98,7 +98,9 @@ BASE = "cfgs/dataset_configs/nuscenes.yaml"
 
 @pytest.fixture
 def config(tmp_path, monkeypatch):
-    """Of a network, in a folder as that of OpenPCDet, with the weights in the current folder."""
+    """The configuration of a network, in a folder as that of OpenPCDet, with the weights in the
+    current folder.
+    """
     monkeypatch.chdir(tmp_path)
     Path("net.pth").touch()
     base = tmp_path / "tools" / BASE

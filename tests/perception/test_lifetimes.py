@@ -70,7 +70,7 @@ def test_a_stateless_detector_is_made_once_per_set_of_parameters(tmp_path):
         assert len(set(pool.map(lambda _: shared(step_m=7.0), range(8)))) == 1
     assert Shared.made == 1
     assert len({shared(anything=value) for value in (1, True, 1.0, "1", [1], None)}) == 6
-    # What cannot be compared is not kept.
+    # Detectors whose parameters cannot be compared are not kept.
     assert shared(anything=np.ones(2)) is not shared(anything=np.ones(2))
     file.write_bytes(b"another")
     assert shared(file=file) is not first

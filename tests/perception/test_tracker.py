@@ -194,7 +194,7 @@ def smoothing(keyframes):
 
 
 def test_an_error_that_alternates_leaves_the_velocity_of_least_squares():
-    """Of errors +-0.1 m at four keyframes a line's slope is off by -0.04 m per keyframe: (-1.5,
+    """Errors of +-0.1 m at four keyframes change a line's slope by -0.04 m per keyframe: (-1.5,
     -.5, .5, 1.5) times (.1, -.1, .1, -.1), over 5. Two keyframes are off by -0.2 m.
     """
     frames = [[("car", 10 + 0.8 * t + 0.1 * (-1) ** t, 2)] for t in range(4)]
@@ -223,7 +223,9 @@ def test_place_and_velocity_are_a_line_through_the_detections(keyframes, missed)
 
 
 def test_older_detections_than_are_asked_for_fade():
-    """What stood for 10 keyframes and is 0.6 m on moves by alpha = 5/6 and beta = 1/2 of that."""
+    """A track that stood for 10 keyframes and is 0.6 m on moves by alpha = 5/6 and beta = 1/2 of
+    that.
+    """
     (*_, tracks) = follow(smoothing(3), [*[[("car", 10, 0)]] * 10, [("car", 10.6, 0)]])
     assert tracks.velocities[0] == pytest.approx([0.5 * 0.6 / DT, 0])
     assert tracks.boxes[0, :2] == pytest.approx([10.5, 0])

@@ -1,4 +1,4 @@
-"""What every policy keeps to, until after the hidden actor appears: each on one environment in
+"""Rules that every policy keeps, until after the hidden actor appears: each on one environment in
 turn, and every environment with four policies.
 """
 
@@ -90,7 +90,7 @@ def test_it_keeps_to_the_budget_repeats_itself_and_shares_nothing(case):
     episode again after a reset.
     """
     env, name = case
-    # Of what plays whole episodes first, few are enough.
+    # Policies that play whole episodes first are content with few.
     one, disturbing, other = (
         care_sim.make_policy(name, env, **AS_LISTED.get(name, {})) for _ in range(3)
     )
@@ -158,7 +158,7 @@ def test_a_policy_lists_its_sets_row_by_row_from_the_top(name, encounter, enviro
 def test_a_policy_of_our_own_begins_with_the_core_of_a_set(
     name, hull_layer, encounter, environment
 ):
-    """What the box covers, without the margins of the rig; wedges are its first layer."""
+    """The core is what the box covers, without the rig's margins; wedges are its first layer."""
     policy = care_sim.make_policy(name, environment)
     bare = replace(policy.rig, azimuth_margin=0, elevation_margin=0)
     checked = [0, 0]

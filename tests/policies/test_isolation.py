@@ -21,7 +21,7 @@ POLICIES = [
     "care_sim.policies.paper.reserves:Care",
     "care_sim.policies.controls.rehearsed:HistoryLearnedPlace",
 ]
-"""Of the camera, and told a scenario."""
+"""The first uses the camera, and the second is told a scenario."""
 SPY = """
 import gc, inspect, os, sys, threading, time
 import gymnasium
@@ -90,7 +90,7 @@ def spy(tmp_path, monkeypatch):
 
 
 def actions(name, env, keyframes=12):
-    """What a policy asks for, and what it says of it."""
+    """The actions of a policy, and the exploitation that it demanded."""
     policy = care_sim.make_policy(name, env)
     observation, _ = env.reset(seed=3)
     policy.reset()

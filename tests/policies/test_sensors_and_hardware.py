@@ -1,5 +1,5 @@
-"""What every policy keeps to with other sensors and hardware than the default: each on one of them
-in turn, and every one with four policies.
+"""Rules that every policy keeps with other sensors and hardware than the default: each on one of
+them in turn, and every one with four policies.
 """
 
 from itertools import product
@@ -51,7 +51,7 @@ UNFIT = {
     ("corners", "vertical-window"): "window of one LiDAR, and the set-up has 3",
     ("corners", "azimuth-window"): "window of one LiDAR, and the set-up has 3",
 }
-"""What does not divide the grid."""
+"""Hardware that does not fit the grid, with its refusal."""
 OF_A_GRID = (
     "place",
     "tuned-place",
@@ -121,7 +121,7 @@ def test_weights_of_another_grid_are_refused_in_one_line(name, setup, needed):
 
 
 def test_the_full_scan_fires_everything_and_finds_the_person_from_the_bumper_too():
-    """Whoever steps out is two metres further ahead of the roof than of the bumper."""
+    """The person who steps out is two metres further ahead of the roof than of the bumper."""
     found = []
     for sensor in ("hdl-32e", FORWARD):
         with gymnasium.make("CARE-Dense-v0", sensor=sensor, budget=1.0, firing="rows") as env:

@@ -1,4 +1,4 @@
-"""What policies make of several LiDARs: each has its own rows, ahead, and lines of sight."""
+"""Policies with several LiDARs: each LiDAR has its own rows, ahead, and lines of sight."""
 
 import numpy as np
 import pytest
@@ -45,7 +45,8 @@ def test_every_lidar_begins_with_the_row_that_suits_its_height():
     for head, own in zip(STACK.heads, np.split(entries, 3), strict=True):
         assert ((own >= head.first) & (own < head.cells.stop)).all()
         assert (own % 64).tolist() == list(range(64))
-    # Rows of the roof are 4 degrees apart from +6 down: -2 is nearest. Of the left corner it is 0.
+    # Rows of the roof are 4 degrees apart from +6 down: -2 is nearest. The nearest row of the left
+    # corner is at 0.
     assert {*(entries[:64] // 64).tolist()} == {2}
     assert {*(entries[64:128] // 64).tolist()} == {8 + 2}
 

@@ -282,7 +282,7 @@ def test_a_policy_is_found_by_its_place_in_the_current_folder(tmp_path, monkeypa
     assert care_sim.make_policy("placed_policy:fewer", env).rows == 1
     assert tags_of("placed_policy:Horizon") == ("causal",)
     assert "placed_policy:Horizon" not in policy_names()
-    # What hides there none of Python's own or of what is installed.
+    # A file there hides no module of Python or of an installed package.
     (tmp_path / "colorsys.py").write_text("raise SystemExit")
     with pytest.raises(BrokenPolicy, match="rgb_to_hls"):
         care_sim.make_policy("colorsys:rgb_to_hls", env)

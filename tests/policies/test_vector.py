@@ -48,7 +48,9 @@ GRIDS = {
 
 
 class Worlds(gymnasium.vector.VectorEnv):
-    """What a policy asks of a vector environment whose worlds are like an environment."""
+    """The attributes that a policy reads of a vector environment whose worlds are like an
+    environment.
+    """
 
     def __init__(self, env):
         self.num_envs = WORLDS

@@ -77,7 +77,7 @@ def by_cost():
 
 
 def seconds(folder):
-    """What its plays took when they were published, on one core."""
+    """Seconds that its plays took when they were published, on one core."""
     return sum(rows(folder).column("wall_s").to_pylist())
 
 

@@ -103,7 +103,7 @@ def test_a_folder_that_nothing_links_is_told_though_others_share_a_task(tmp_path
     unknown = folder(tmp_path / "unknown", rows("fan", [9.0, 9.0]))
     (unknown / "config.json").unlink()
     assert merged([ours, theirs, third, unknown]).apart == [third, unknown]
-    # What was merged is of the code of its parts.
+    # Merged rows are of the code of their parts.
     merged([ours, theirs]).write(tmp_path / "both")
     later = folder(tmp_path / "later", rows("random", [9.0, 9.0]), code="another")
     assert merged([tmp_path / "both", later]).apart == []

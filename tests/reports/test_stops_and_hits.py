@@ -1,4 +1,4 @@
-"""What tables make of a stop for nothing, and of a collision that another body causes."""
+"""A stop for nothing, and a collision that another body causes, as tables count them."""
 
 from care_sim.reports.engine.contrasts import contrast_of_rows
 from care_sim.reports.engine.frames import Frame

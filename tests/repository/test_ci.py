@@ -1,4 +1,4 @@
-"""What CI runs: a browser where there is none, all tests with Python 3.11, some with later ones."""
+"""The steps of CI: a browser where none is, all tests with Python 3.11, some with later ones."""
 
 import shutil
 import subprocess
@@ -27,7 +27,7 @@ def program(path, line):
 
 
 def ran(clone):
-    """What CI's script prints, and the programs that it called."""
+    """The output of CI's script, and the programs that it called."""
     done = subprocess.run(
         [shutil.which("bash"), str(clone / ".ci" / "run")],
         env={"PATH": str(clone / "bin"), "HOME": str(clone)},

@@ -10,7 +10,7 @@ COMMUNITY = ROOT / "docs" / "community"
 
 
 def front_matter(name):
-    """What Hugging Face reads of a card."""
+    """The data that Hugging Face reads of a card."""
     _, head, text = (COMMUNITY / name).read_text().split("---\n", 2)
     assert text.startswith("\n# ")
     return yaml.safe_load(head)

@@ -26,7 +26,7 @@ LEFT_BEHIND = (
     "runs/mine/rows.parquet",
     "tests/helpers/__pycache__/numba.py311.nbi",
 )
-"""What work leaves in a clone, and no distribution may hold."""
+"""Files that work leaves in a clone, and no distribution may hold."""
 
 
 @pytest.fixture(scope="module")

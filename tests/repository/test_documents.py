@@ -36,7 +36,7 @@ FURTHER = {
     "import polars": "polars",
     "from torchrl": "torchrl",
 }
-"""What a block names, and the library that it then needs beside the installation."""
+"""Names in a block, and the library that each then needs beside the installation."""
 STRATUM_SUM = re.compile(r"[^/]+/[^/]+/(delay|events|found|frames|sighted)")
 """KIND/STRATUM/NAME, which a page explains in one line for all strata."""
 
@@ -98,7 +98,7 @@ def test_commands_are_understood():
 
 
 def test_files_that_a_page_names_are_there():
-    """Those of the repository, as seen from its root."""
+    """Files of the repository, as seen from its root."""
     named = [
         (page, name)
         for page in PAGES
@@ -273,7 +273,7 @@ def test_every_column_that_is_read_is_explained():
 
 
 def unexplained(names):
-    """Those that neither the page of columns nor that of conditions names."""
+    """Names that are neither on the page of columns nor on that of conditions."""
     pages = ROOT / "docs" / "columns.md", ROOT / "docs" / "api" / "conditions.md"
     text = "".join(page.read_text() for page in pages)
     explained = re.findall(r"^(?:- (.*?): |\| (.*?) \|)", text, re.M)

@@ -1,4 +1,4 @@
-"""What an episode makes a process load: a worker must stay small."""
+"""Libraries that an episode makes a process load: a worker must stay small."""
 
 import json
 import pathlib
@@ -37,9 +37,9 @@ HEAVY = {
     "torch",
     "tyro",
 }
-"""What an episode does not need. highway-env, whose roads and drivers it does, loads its own
-environments and with them pandas (with PyArrow), Matplotlib and pygame: 96 MB and a second of every
-worker, since no part of it comes without the rest."""
+"""Libraries that an episode does not need. It needs the roads and drivers of highway-env, which
+loads its own environments and with them pandas (with PyArrow), Matplotlib and pygame. These take 96
+MB and a second of every worker, since no part of highway-env comes without the rest."""
 
 
 @pytest.mark.parametrize("engine", ["bullet", "fast"])

@@ -39,7 +39,7 @@ NEED_LIBRARIES = (
 
 
 def distributions(extra):
-    """What an extra asks for, with what the extras that it names do."""
+    """Libraries that an extra needs, with those of the extras that it names."""
     for wanted in EXTRAS[extra]:
         named = re.fullmatch(r"care-sim\[(.*)\]", wanted)
         if named:
@@ -123,7 +123,9 @@ MISSED = {
 
 
 def without_extras(folder, modules, lines):
-    """What a process that lacks all optional libraries says as it loads modules and runs lines."""
+    """The messages of a process that lacks all optional libraries as it loads modules and runs
+    lines.
+    """
     given = map(json.dumps, (sorted(OPTIONAL), modules, lines))
     command = [sys.executable, "-c", WITHOUT, *given]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stderr

@@ -72,7 +72,7 @@ def address(site):
 
 @pytest.fixture(scope="module")
 def walked(chromium, site, address):
-    """What is said of every page by its path, by how much it is wider than a phone, and the
+    """The data about every page by its path, with how much it is wider than a phone; and the
     troubles that the browser told.
     """
     page, troubles = chromium.new_context(**DESK).new_page(), []

@@ -15,12 +15,12 @@ from care_sim.world.motions import Crosser
 from care_sim.world.world import WORLD_STEP_S
 
 SEEDS = (2, 3, 16, 46, 95, 137)
-"""Of those that hold encounters of every course, turns to both sides and bends."""
+"""Seeds of drives that hold encounters of every course, turns to both sides and bends."""
 
 
 class Passage(NamedTuple):
-    """What came of a drive: the meetings; per body of one the least clearance after it set off; the
-    names of what else was touched; how far the ego came, and its goal.
+    """The outcome of a drive: the meetings; per body of one the least clearance after it set off;
+    the names of other touched bodies; how far the ego came, and its goal.
     """
 
     meetings: list

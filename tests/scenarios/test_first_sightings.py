@@ -39,8 +39,8 @@ class Sight:
 
 
 def sight(world):
-    """What a full scan and the camera have of the first-sighting actor; rays outside its hull
-    cannot meet it.
+    """Returns and pixels of the first-sighting actor, of a full scan and the camera; rays outside
+    its hull cannot meet it.
     """
     actor, sensor = world.first_sighting, Frame.mounted(world.ego.pose, LIDAR_POSITION)
     box = sensor.boxes_to_local(world.boxes([actor]))

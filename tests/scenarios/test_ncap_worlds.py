@@ -1,4 +1,4 @@
-"""What an ego meets in the Euro NCAP tests, and when they are over."""
+"""Encounters of an ego in the Euro NCAP tests, and when they are over."""
 
 from collections import Counter
 
@@ -203,7 +203,7 @@ def test_every_test_and_each_of_its_speeds_is_drawn_as_often():
     scenario = make_scenario("ncap", test="drawn", speed_kph=0)
     drawn = [scenario.drawn(np.random.default_rng(seed)) for seed in range(4000)]
     counts = Counter(each.test for each in drawn)
-    # Of 4,000 draws from 21 tests, 190 each; four standard deviations are 54.
+    # Each of 21 tests gets 190 of 4,000 draws; four standard deviations are 54.
     assert set(counts) == set(TESTS)
     assert max(abs(count - 4000 / 21) for count in counts.values()) < 54
     for name, test in TESTS.items():

@@ -124,8 +124,8 @@ def test_a_late_camera_shows_exactly_the_picture_of_then(latency):
 
 
 def test_rendering_only_a_window_shows_the_same_bodies(bullet):
-    """What is looked for lies in the window whole, hidden and half-hidden parts as in the full
-    picture.
+    """The body that is looked for lies whole in the window, with hidden and half-hidden parts as in
+    the full picture.
     """
     places = {
         "car": (12, 3),

@@ -1,4 +1,4 @@
-"""What goes wrong with the cameras of many worlds is what goes wrong with each alone."""
+"""Faults of the cameras of many worlds are those of each alone."""
 
 import numpy as np
 from hypothesis import given, settings

@@ -247,8 +247,8 @@ def streets():
 
 @pytest.mark.parametrize("world", ["dense", "streets"])
 def test_small_classifiers_of_single_boxes_tell_no_more_than_they_did(world, request):
-    """With 300 boxes of each kind. What else tells them apart, and how well, is in
-    `results/degraded-sensing.md`.
+    """With 300 boxes of each kind. `results/degraded-sensing.md` says what else tells them apart,
+    and how well.
     """
     episodes = request.getfixturevalue(world)
     areas = areas_under_the_curve(

@@ -1,4 +1,4 @@
-"""What several LiDARs return: each from its own place, all told in the frame of the first."""
+"""Returns of several LiDARs: each from its own place, all told in the frame of the first."""
 
 from contextlib import closing
 
@@ -71,7 +71,7 @@ def test_only_the_second_lidar_sees_who_is_behind_the_truck(hidden, engine):
     assert ranges[straight] == pytest.approx(19.3, abs=1e-3)
     assert ranges[MIDDLE] == pytest.approx(9.8, abs=1e-3)
 
-    # What a detector is given of it lies on the person, in the frame of the first LiDAR.
+    # The points that a detector is given of it lie on the person, in the frame of the first LiDAR.
     cloud = cloud_of(Scan(cells, ranges), bodies, PAIR)
     points = cloud.points[cloud.objects == person]
     assert points[cloud.cells[cloud.objects == person] == straight][0] == pytest.approx(

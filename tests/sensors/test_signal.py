@@ -104,7 +104,7 @@ def test_rays_on_one_surface_are_one_echo_as_strong_as_it():
 
 
 def test_what_is_more_than_a_metre_apart_gives_two_echoes():
-    """Of equal intensity, the nearer one is the stronger: 1 / r^2."""
+    """With equal intensity the nearer one is the stronger: 1 / r^2."""
     echoes = beam((20.0, 0.4, 5), (10.0, 0.4, 4), (20.0, 0.4, 5), (10.0, 0.4, 4))
     assert echoes.ranges == pytest.approx([10.0, 20.0])
     assert echoes.intensities == pytest.approx([0.2, 0.2])

@@ -63,7 +63,7 @@ OBJECTS = (
 
 
 def told(frame="world", count=6, **changes):
-    """What `film_of_boxes` takes: a car at 8 m/s past what stands."""
+    """Arguments of `film_of_boxes`: a car at 8 m/s past standing bodies."""
     ego = [[100 + 4.0 * k, 50.0, 10.0, 0.0] for k in range(count)]
     boxes = [
         [

@@ -158,7 +158,7 @@ def test_drives_without_poses_are_reported(tmp_path, capsys):
     [("0000", 12, 0.65, 1.0), ("0014", 10, 0.45, 0.8), ("0005", 35, 1.6, 2.1)],
 )
 def test_standing_cars_of_real_drives_stay(recorded, drive, newcomers, median_m, most_m):
-    """Drive 14 has metric poses. Those of the others are 3% too long: see the bend of drive 0."""
+    """Drive 14 has metric poses. Poses of the others are 3% too long: see the bend of drive 0."""
     film = film_of(recorded / "kitti-tracking", drive)
     sightings = Sightings.of(drive, [shot.annotations for shot in film.shots], hidden=film.hidden)
     assert len(sightings.events) == newcomers

@@ -1,4 +1,4 @@
-"""Whatever a source reads is part of the key of its plays."""
+"""Everything that a source reads is part of the key of its plays."""
 
 import json
 import sys

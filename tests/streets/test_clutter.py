@@ -1,4 +1,4 @@
-"""What clutter adds to a street, and what it leaves free."""
+"""Bodies that clutter adds to a street, and space that it leaves free."""
 
 from functools import cache
 
@@ -85,7 +85,7 @@ def test_nothing_stands_where_anybody_drives_walks_or_stands(seed):
     for keyframe in range(0, len(street.ego), 6):
         poses = np.vstack([street.poses[keyframe], street.ego[keyframe]])
         assert meeting(standing, poses, np.vstack([sizes, ego])) == []
-        # What juts out of a wall is in the wall, and no wall moves.
+        # A relief juts out of a wall and is in it, and no wall moves.
         moved = (street.poses[keyframe] != street.poses[0]).any(axis=1)
         reliefs = [one for one in street.clutter if one[0].name == "relief"]
         moving = np.vstack([street.poses[keyframe][moved], street.ego[keyframe]])

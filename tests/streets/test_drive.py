@@ -1,4 +1,4 @@
-"""What is drawn of a drive."""
+"""The parts of a drive that are drawn."""
 
 from functools import cache
 
@@ -87,7 +87,7 @@ def test_nobody_waits_in_the_egos_way_nor_in_the_way_of_its_sight():
             np.broadcast_to(CATALOGUE[one.who].size[:2], (count, 2)),
             np.zeros(count),
         ).any()
-        # What stands leaves the lines of sight free, but for who else is met.
+        # Standing bodies leave the lines of sight free, but for others who are met.
         eyes, seen = np.moveaxis(np.array(one.sight.lines), 1, 0)
         for kind, way in zip(drive.kinds, drive.ways, strict=True):
             if (way == way[0]).all():

@@ -17,7 +17,7 @@ from care_sim.world.bodies import CATALOGUE
 
 SEEDS = (0, 1, 2, 3, 6, 1001)
 DIGESTS = json.loads(Path(__file__).with_name("digests.json").read_text())
-"""Of every street of the evaluation and of the calibration, by seed."""
+"""Digests of every street of the evaluation and of the calibration, by seed."""
 VEHICLES = ("car", "van", "truck", "bus")
 
 

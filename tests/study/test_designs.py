@@ -1,4 +1,4 @@
-"""What the published studies play: their tables of levels as configurations."""
+"""The plays of the published studies: their tables of levels as configurations."""
 
 from collections import Counter
 
@@ -169,7 +169,7 @@ def test_no_seed_of_a_validation_is_both_and_each_part_has_its_policies():
     assert parts[True] == dict.fromkeys(chosen, 2 * 2 * 2)
     others = [*chosen, "history", "random", validate.MEMORISER]
     assert parts[False] == dict.fromkeys(others, 2 * 2 * 3) | {"full": 2 * 3}
-    # What is learned is learned on as many seeds as are trained on.
+    # Policies that learn do so on as many seeds as are trained on.
     told = {(c.policy, dict(c.policy_parameters).get("seeds")) for c in configs}
     assert {number for policy, number in told if policy.endswith("learned-place")} == {2}
     assert {(validate.MEMORISER, 2000), ("care", None)} < told

@@ -58,7 +58,7 @@ def test_hardware_and_policies_that_do_not_fit_a_set_up_are_left_out_with_a_line
     assert "place (weights" in said
     assert len(fits.left_out) == 4
     assert firing.fitting("hdl-32e").left_out == []
-    # Of four rows 3% are none.
+    # A budget of 3% leaves none of four rows.
     setup = SensorSetup("four", AngularGrid(512, 4, 0.05, -0.05))
     said = " ".join(firing.fitting(setup).left_out)
     assert "left out with four: rows (budget 0.03 leaves no row of 4" in said
@@ -146,7 +146,7 @@ def test_conditions_that_cannot_be_played_are_left_out_with_a_line(drive):
     assert {"sweep of 0.1 s", "range 40 m", "realistic car"} < left
     assert len(left) == len(fits.left_out) == 6
     assert "yolox camera" in labels(fits.sound)
-    # What is wrong with all of them is no reason to leave each out.
+    # A fault of all of them is no reason to leave each out.
     with pytest.raises(InvalidInput, match="budget"):
         realism.film_conditions(STREETS, SCENES, 2.0)
 

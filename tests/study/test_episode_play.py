@@ -79,7 +79,7 @@ def test_who_asks_for_truth_and_what_is_not_built_in_is_played_alone():
     asking = EpisodeConfig("dartout", "history-oracle")
     with pytest.raises(InvalidInput, match="asks its own world for the truth"):
         play_together([asking, asking.changed(seed=1)])
-    # What is surely alone does not wait for others in a batch.
+    # An episode that is surely alone does not wait for others in a batch.
     for config in (
         asking,
         EpisodeConfig("care_sim.scenarios.dartout:Dartout", "care"),
@@ -173,7 +173,7 @@ def test_a_system_that_does_not_tell_the_peak_is_asked_otherwise(monkeypatch):
 # Every death costs the start of a worker.
 @pytest.mark.slow
 def test_one_that_kills_its_worker_costs_only_itself(third_party, tmp_path):
-    # Of seeds 1 and 2 the car brakes in the second.
+    # The car brakes in the second of seeds 1 and 2.
     configs = grid(["dartout"], ["dies-in-the-brake"], [0.03], range(1, 3))
     with Journal(tmp_path / JOURNAL) as journal:
         failures = run_all(configs, journal, 1)

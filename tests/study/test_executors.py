@@ -145,7 +145,7 @@ def steady(row):
 
 @pytest.mark.slow
 def test_a_killed_worker_costs_a_retry_and_every_row_is_the_one_played_here(dask_cluster, tmp_path):
-    # Of a policy that is played one by one, so that there are as many batches as episodes.
+    # The policy is played one by one, so that there are as many batches as episodes.
     policies = ["history-oracle"]
     configs = grid(["dartout"], policies, [0.1], range(30), scenario_parameters=LONG)
     doomed, _ = dask_cluster.worker(), dask_cluster.worker()

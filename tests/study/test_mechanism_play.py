@@ -55,7 +55,7 @@ def account(policy, **conditions):
 
 
 def wedge_of(number):
-    """Of the image box of an object at the last keyframe."""
+    """The wedge of an object's image box at the last keyframe."""
     seen = FILM.shots[-1].seen
     (place,) = np.flatnonzero(seen.objects == number)
     return wedges(seen.detections, RIG)[place]

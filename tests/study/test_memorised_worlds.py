@@ -45,7 +45,9 @@ class Memoriser(care_sim.Policy):
 
 
 def looks(belief):
-    """What the first observation says: the car's motion, and how much each camera shows where."""
+    """The features of the first observation: the car's motion, and how much each camera shows
+    where.
+    """
     shown = belief.detections.boxes
     widths, _ = np.histogram(shown[:, 0], 20, (0, 1600))
     return np.concatenate([[belief.ego.speed, belief.ego.yaw_rate, len(shown)], widths])

@@ -30,7 +30,7 @@ def test_two_rows_of_one_task_must_be_alike(tmp_path):
         folder(tmp_path, [*ROWS[1:], ROWS[3] | {column: 7}])
         with pytest.raises(InvalidInput, match=rf"dense care 0\.1 came out differently .*{column}"):
             read_results(tmp_path)
-    # Who played it and how fast, and what is worked out beside the other rows, may differ.
+    # The version, the time that it took, and columns worked out beside the other rows may differ.
     folder(tmp_path, [*ROWS, ROWS[3] | {"wall_s": 7.0, "version": "0.1.0"}])
     assert len(read_results(tmp_path)[0]) == len(ROWS)
 

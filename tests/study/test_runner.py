@@ -130,7 +130,7 @@ def test_episodes_are_played_seed_by_seed_and_written_in_the_order_asked(tmp_pat
     configs = short(["history", "history-oracle"], seeds=(0, 1, 2))
     run_study(configs, tmp_path, workers=1)
     played = [json.loads(line)["seed"] for line in (tmp_path / JOURNAL).read_text().splitlines()]
-    # Those of history are one batch; those of a privileged policy are played one by one.
+    # Episodes of history are one batch; those of a privileged policy are played one by one.
     assert played == [0, 1, 2, 0, 1, 2]
     assert [row["digest"] for row in read_rows(tmp_path / EPISODES.file)] == [
         config.digest() for config in configs
@@ -259,7 +259,7 @@ def test_a_fork_server_that_fails_once_costs_nothing(tmp_path, error):
 
 @pytest.mark.slow
 def listen_to_interrupts():
-    """What is started in the background inherits deaf ears."""
+    """A process that is started in the background inherits ignored interrupts."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 

@@ -1,7 +1,8 @@
 """Campaign: random calls of the public interface, with values that nobody asked for.
 
-A call must return, or raise what `judge.call` allows. What returns has to be sound: observations
-lie in their space, rewards are finite and at most 0, no more cells fire than may, none twice.
+A call must return, or raise what `judge.call` allows. A returned value has to be sound:
+observations lie in their space, rewards are finite and at most 0, no more cells fire than may, none
+twice.
 
 Doors (making, resetting, stepping, policies, beliefs, allocation, configurations) are given
 anything at all. The arithmetic of grid and tables is given arrays of the shape that it asks for,
@@ -321,7 +322,7 @@ def scenario(case):
 
 
 def configuration(case):
-    """What a row of a study is made of, and its digest; the conditions alone; or a detector."""
+    """The configuration of a study's row, and its digest; the conditions alone; or a detector."""
     from care_sim.core.conditions import ClosedLoopConditions
     from care_sim.perception.detectors import detector_names, make_detector
     from care_sim.study.episode_config import EpisodeConfig
@@ -391,4 +392,4 @@ ACTIONS = {
     wrapper: 3,
     tables: 2,
 }
-"""What is called, and how often."""
+"""Kinds of calls, and how often each is made."""

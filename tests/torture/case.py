@@ -22,7 +22,7 @@ FOUND = "found"
 
 
 class Name(NamedTuple):
-    """What a case is called; everything in it follows from that."""
+    """The name of a case; everything in it follows from that."""
 
     campaign: str
     seed: int | str
@@ -53,7 +53,9 @@ def found(campaign):
 
 
 class Fault(Exception):
-    """What must not happen: of a `kind`, somewhere in the code (`place`), told in `detail`."""
+    """An event that must not happen: of a `kind`, somewhere in the code (`place`), told in
+    `detail`.
+    """
 
     def __init__(self, kind, detail="", place=""):
         super().__init__(f"{kind} at {place}: {detail}" if place else f"{kind}: {detail}")

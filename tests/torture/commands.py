@@ -15,7 +15,7 @@ LIMIT_S = 10.0
 HONEST_S = 0.7
 """After this a command that may take long is interrupted; it has to end as one that was."""
 ENCODINGS = ("utf-8",) * 12 + ("ascii", "latin-1")
-"""Of stdout and stderr, as the environments of users have them."""
+"""Encodings of stdout and stderr, as the environments of users have them."""
 TINY = ("--scenario-parameters", "duration_s=0.2")
 FOUND_CASES = (
     (("study", "crowding", "--seeds", "2147483647", "--workers", "1"), True, "utf-8"),
@@ -137,7 +137,7 @@ def _speak(encoding):
 
 
 def _said():
-    """What stands in stdout and stderr, without the colours that FORCE_COLOR gives them."""
+    """The content of stdout and stderr, without the colours that FORCE_COLOR gives them."""
     sys.stdout.flush()
     sys.stderr.flush()
     texts = [os.pread(number, os.fstat(number).st_size, 0) for number in (1, 2)]

@@ -41,7 +41,7 @@ class Failure:
 
 @dataclass
 class Tally:
-    """What came of a campaign."""
+    """The outcome of a campaign."""
 
     endings: Counter = field(default_factory=Counter)
     failures: list[Failure] = field(default_factory=list)

@@ -128,7 +128,7 @@ def journal(case):
 
 
 def _torn(rng, data):
-    """What is left of a journal after a crash, or after somebody joined and sorted files."""
+    """The rest of a journal after a crash, or after somebody joined and sorted files."""
     lines = data.splitlines(keepends=True)
     at = rng.randrange(len(data))
     return rng.choice(
@@ -162,6 +162,6 @@ def _swapped_digests(rng, path):
 
 
 KINDS = {weights: 4, results: 4, plays: 2, training: 2, recordings: 1, journal: 3}
-"""What is read, and how often."""
+"""Files that are read, and how often."""
 FOUND_CASES = (weights, results, plays, training, journal)
 """Played without damage, or no damage would tell anything."""

@@ -72,7 +72,7 @@ def play(case):
 
 
 def _seen(folder):
-    """What lies in a folder, with content, rights and links as they are."""
+    """The files of a folder, with content, rights and links as they are."""
     return {
         str(path): (
             path.lstat().st_mode,
@@ -163,4 +163,4 @@ KINDS = {
     "a folder of somebody else": _folder(0o755, 12345),
     "a sticky folder": _folder(0o1777, 12345),
 }
-"""What may stand where something is written."""
+"""Things that may be at the path of an output."""

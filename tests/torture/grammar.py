@@ -130,7 +130,7 @@ class Grammar:
         return rng.choice(SOURCES if name == "source" else (*self._names(name), *PIECES))
 
     def _names(self, name):
-        """What fits an option of this name; thrice, so that it is drawn more often."""
+        """Values that fit an option of this name; thrice, so that they are drawn more often."""
         from care_sim.core.conditions import DRIVERS
         from care_sim.core.defaults import CELL_ORDERS
         from care_sim.core.firing.listing import HARDWARE

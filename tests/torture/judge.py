@@ -1,4 +1,4 @@
-"""What a command or a call may answer, and what is a fault.
+"""Allowed answers of a command or a call, and faults.
 
 A command ends with code 0 (done), 1 (something failed or was left out), 2 (bad input), 130
 (interrupted) or 141 (nobody reads its output any more). 70, a fault of the software itself, is
@@ -9,7 +9,7 @@ there is at least one. No line holds control codes, rules of a box or a Python t
 A call returns, or raises InvalidInput or MissingExtra with one line, or Gymnasium's own error for a
 step without a reset. TypeError is Python's own where the call itself does not fit the signature (a
 keyword that there is not, a missing or surplus argument), and only there: a wrong value is
-InvalidInput. What Gymnasium itself refuses, before anything of ours is called, it says in its own
+InvalidInput. Gymnasium itself refuses some calls before anything of ours is called, in its own
 words.
 """
 
@@ -39,7 +39,7 @@ NOTICES = (
     r"([a-z ]+ )?(street|drive|test|world) \d+ of \d+ *",
     r"the first take longer on a machine that has not played before: .*",
 )
-"""What a command may say on stderr about how far it is, beside lines of its own name."""
+"""Lines on stderr about the progress of a command, beside lines of its own name."""
 OWN_SIGNATURE = re.compile(
     r"unexpected keyword argument|required (positional|keyword-only) argument"
     r"|positional arguments? but"

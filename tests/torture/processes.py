@@ -32,7 +32,7 @@ ANOTHER_USER = (
 HANGS_S = 10.0
 """On a quiet machine; others are given `patience` times as long."""
 LEAVES_S = 6.0
-"""What a process that ends may leave behind has to be gone by then."""
+"""Seconds until all that an ended process leaves behind has to be gone."""
 POLL_S = 0.02
 
 
@@ -163,7 +163,7 @@ class Command:
             time.sleep(0.1)
 
     def stacks(self):
-        """What its processes wait for, as far as the kernel tells."""
+        """The calls in which its processes wait, as far as the kernel tells."""
         return "\n".join(f"{pid} {_told(pid)}" for pid in marked(self.mark))
 
 

@@ -170,7 +170,7 @@ def _make_recording(path):
 
 
 def _make_trained(path):
-    """What `train curves` reads, as `train ppo` leaves it."""
+    """The input of `train curves`, as `train ppo` leaves it."""
     from care_sim.training.config import PpoConfig
 
     path.mkdir()

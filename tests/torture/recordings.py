@@ -238,4 +238,4 @@ class Boxes(Recordings):
 
 
 KINDS = {argoverse2: 5, other_log: 2, nuscenes: 8, own_boxes: 4, kitti: 5, sweeps: 6}
-"""What is read, and how often."""
+"""Recordings that are read, and how often."""

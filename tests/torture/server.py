@@ -47,7 +47,7 @@ def main():
 
 
 def _answer(name, place):
-    """What came of a case that is played in a folder of its own."""
+    """The outcome of a case that is played in a folder of its own."""
     started = time.monotonic()
     child = os.fork()
     if not child:

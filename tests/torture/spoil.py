@@ -13,7 +13,7 @@ PLAIN = [
     *("", "x", "care", "\ud800", "\x00", "\x1b[31m", "x" * 100_000, "<script>", "$x_1$", "2**9"),
     *([], {}, [[]], [1, 2], {"a": 1}, [None], [[1, [2]]]),
 ]
-"""What may stand in JSON where something else belongs."""
+"""Values that may be in JSON where something else belongs."""
 
 
 ODD_BYTES = (

@@ -15,7 +15,7 @@ from tests.torture.commands import TINY
 from tests.torture.processes import Command
 
 LIMIT_S = 240.0
-"""Of a case: several runs of a study; each of its commands has a limit of its own."""
+"""Limit of a case: several runs of a study; each of its commands has a limit of its own."""
 SIGNALS = {
     signal.SIGKILL: 6, signal.SIGINT: 5, signal.SIGTERM: 4, signal.SIGHUP: 3, signal.SIGQUIT: 2,
 }  # fmt: skip
@@ -120,7 +120,7 @@ def _send(rng, command, number, whom):
 
 
 def _judge(code, number, whom, out, err, command, started):
-    """What may come of it: its end, or that of the signal, which leaves no traceback."""
+    """Judge the end of a command: its own, or that of the signal, which leaves no traceback."""
     if code == -number == -signal.SIGKILL:
         if "Traceback" in out + err:
             judge.ending(0, out, err, command.arguments)
@@ -136,7 +136,7 @@ def same_study(case):
     with ExitStack() as stack:
         line = study.command("out", case.rng.choice((1, 2)))
         commands = _started(case, line, stack)
-        # What is there is whole whenever it is read.
+        # Files are whole whenever they are read.
         while any(command.process.poll() is None for command in commands):
             if out.exists():
                 study.check_not_torn(out)
@@ -221,7 +221,7 @@ def full(case):
 
 
 def _check_left(folder, product, before):
-    """What was there is there; what is new is whole or absent."""
+    """Old files are still there; new ones are whole or absent."""
     for name, content in before.items():
         found = [path for path in folder.rglob(name) if path.is_file()]
         if not any(path.read_bytes() == content for path in found) and name not in REMADE:
@@ -247,7 +247,7 @@ WRITERS = (
 
 
 ENDS = {".html": b"</html>", ".mp4": b"moov"}
-"""What stands at the end of a whole file."""
+"""Bytes at the end of a whole file."""
 
 
 def check_file(path):

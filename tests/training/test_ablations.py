@@ -1,4 +1,4 @@
-"""What a learner is trained without never reaches it, nor the weights that are kept."""
+"""Inputs that a learner is trained without never reach it, nor the weights that are kept."""
 
 import numpy as np
 import pytest

@@ -241,7 +241,7 @@ def test_the_middle_half_counts_alone():
     assert interquartile_mean(np.arange(1.0, 9.0)[None]).value == 4.5, "of 3, 4, 5 and 6"
     outliers = np.array([[-1e9, -50, 3, 4, 5, 6, 70, 1e9]])
     assert interquartile_mean(outliers) == (4.5, None, None), "a single run has no interval"
-    # Of five values the paper's library too leaves one out at either end.
+    # The paper's library too leaves one of five values out at either end.
     assert interquartile_mean([[1.0], [2.0], [3.0], [4.0], [100.0]]).value == 3.0
 
 
@@ -258,8 +258,8 @@ def test_runs_are_drawn_task_by_task_and_independently():
 
 
 def test_the_interval_is_as_wide_as_theory_says():
-    """Of a mean-like statistic of n normal scores about 2 * 1.96 * 1.09 / sqrt(n): the
-    interquartile mean's deviation is 1.09 times the mean's.
+    """The interval of a mean-like statistic of n normal scores is about 2 * 1.96 * 1.09 / sqrt(n):
+    the interquartile mean's deviation is 1.09 times the mean's.
     """
     scores = np.random.default_rng(3).normal(size=(400, 1))
     _, low, high = interquartile_mean(scores)

@@ -93,7 +93,7 @@ def test_who_learns_without_faults_is_validated_with_them():
 
 
 def test_every_reset_draws_another_episode_and_a_budget_of_ones_own_changes_no_other_part():
-    """What `full` plays is what the others play."""
+    """`full` plays what the others play."""
     with plain(CONFIG) as env, plain(CONFIG, 1.0) as whole, training(CONFIG) as learns:
         told = [one.reset(seed=VALIDATION)[1] for one in (env, whole)]
         np.testing.assert_equal(*told)

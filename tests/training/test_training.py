@@ -37,7 +37,7 @@ def care(capsys, *arguments):
 
 
 def hash_of(played):
-    """Of the episode whose timeline was printed."""
+    """The hash of the episode whose timeline was printed."""
     return re.search(r"^episode_hash +(\S+)$", played, re.MULTILINE)[1]
 
 

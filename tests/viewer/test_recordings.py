@@ -87,7 +87,7 @@ def test_the_returns_of_several_lidars_are_recorded_in_the_frame_of_the_first(tm
         np.array(found.column("care/world/bodies", f"Boxes3D:{name}")[-1])
         for name in ("centers", "half_sizes")
     )
-    # What stands above the road is a body where it is drawn; all of them stand along the road.
+    # Points above the road lie in a body where it is drawn; all bodies stand along the road.
     points = np.add(clouds[-1], origin)
     high = points[:, 2] > 0.05
     inside = np.abs(points[high, None] - centres) < np.hypot(halves[:, :1], halves[:, 1:2]) + 0.02

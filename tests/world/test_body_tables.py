@@ -51,7 +51,7 @@ def test_footprints_are_near_by_their_rectangles_not_by_the_circles_around_them(
 
 
 def test_tables_grow_with_the_street():
-    """What was there before stays, more bodies than there was room for, and an id left out."""
+    """Earlier bodies stay, with more than there was room for, and with an id left out."""
     boxes, parts = Footprints(), Primitives()
     kinds = [CATALOGUE[name] for name in sorted(CATALOGUE)] * 5
     for body, kind in enumerate(kinds, start=1):

@@ -25,13 +25,13 @@ ROADS = st.tuples(
 
 
 def road(speed, drivers, width, limit):
-    """Of some the lanes are so narrow that highway-env takes who is beside for who is ahead."""
+    """Some lanes are so narrow that highway-env takes a vehicle beside for one ahead."""
     traffic = Traffic((1,) * LANES, 0, width, limit)
     ego = traffic.add_ego(0.0, speed, EGO)
     return traffic, [ego, *(traffic.add_driver(x, lane, mps, CAR) for x, lane, mps in drivers)]
 
 
-# Of two who are equally near ahead, one counts.
+# Only one of two vehicles that are equally near ahead counts.
 @example([(8.0, [(0.0, 0, 3.0), (-20.0, 0, 8.0)], 3.5, 14.0, [0.0])])
 @settings(max_examples=60)
 @given(st.lists(ROADS, min_size=1, max_size=4))

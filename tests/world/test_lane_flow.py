@@ -100,7 +100,7 @@ def test_drivers_stop_before_who_crosses_until_they_are_over(crossings, place):
     street = StreetTraffic([lane([-100.0], crossings=crossings)])
     reached = driven(street, 20.0, 0.0)
     assert reached == pytest.approx(place, abs=1.0) if place else reached < -STANDING_GAP_M + 1.0
-    # Who is over the lane holds nobody up.
+    # Somebody who is over the lane holds nobody up.
     for step in range(401, 1201):
         street.step(STEP, step * STEP, 0.0, 0.0)
     assert (street.pose_at(0, 0, 0.0)[0] > 50.0) is (place != -STANDING_GAP_M)

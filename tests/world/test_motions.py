@@ -91,7 +91,7 @@ def test_it_decides_once():
     for time, left in ((4.0, 2.9), (5.0, 1.9), (7.0, 0.5)):
         one.look(time, lambda left=left: asked.append(left) or left)
     assert one.walk.starts_s == pytest.approx(4.9)
-    # Who has decided asks no more.
+    # A walker who has decided asks no more.
     assert asked == [2.9, 1.9]
 
 

@@ -92,7 +92,7 @@ def test_the_ego_stops_and_never_reverses():
 
 
 def as_highway_env_drives(monkeypatch, run):
-    """What `run` gives on the vehicles and lanes of highway-env itself."""
+    """The result of `run` on the vehicles and lanes of highway-env itself."""
     with monkeypatch.context() as patch:
         patch.setattr(lane_driver, "LaneDriver", IDMVehicle)
         patch.setattr(lane_driver, "StraightVehicle", Vehicle)

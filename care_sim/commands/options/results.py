@@ -38,8 +38,8 @@ class Benchmark(WorkerOptions):
     """Play the benchmark: B90, how few cells are enough.
 
     B90 is the smallest budget at which a policy has 90% of what a full scan has, on every count.
-    Streets are played at seven budgets: 560 plays per entry, 168 with --quick. A result file per
-    entry, a figure, and a line beside the published entries.
+    Streets are played at seven budgets: 560 plays per entry, 168 with --quick. The command writes a
+    result file per entry and a figure, and prints a line per entry beside the published entries.
     """
 
     policy: tuple[str, ...] = ()
@@ -53,7 +53,9 @@ class Benchmark(WorkerOptions):
     name: str = ""
     """Name of the entry in tables, if a single policy is played."""
     detector: str = "centerpoint"
-    """The detector. Published entries use centerpoint only."""
+    """The detector. Entries are ranked under centerpoint, and only its results are printed beside
+    published entries. `results/b90.md` lists B90 on streets under megvii, pointrcnn and returns,
+    too."""
     closed_loop: Flag = False
     """Play drives and Euro NCAP tests too. Collisions avoided and needless stops then count as
     well."""
@@ -107,8 +109,8 @@ class Leaderboard(WorkerOptions):
     results: Annotated[
         tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RESULTS...")
     ] = ()
-    """Result files, or folders of them; without any, the published entries alone. Of two with one
-    name and code the first counts."""
+    """Result files, or folders of them; without any, the published entries alone. If two have one
+    name and code, the first counts."""
     verify: Flag = False
     """Play a random tenth of the worlds of every result again, instead of a table. Their policies
     must be installed here."""

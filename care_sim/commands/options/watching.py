@@ -40,7 +40,7 @@ class Run(WatchOptions):
     """Play one episode and print its timeline and outcome.
 
     A trained agent plays where it learned, in the first of several environments and without drawn
-    faults. What it learned with counts where an option has its default.
+    faults. The settings of its training count where an option has its default.
     """
 
     what: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO|SOURCE|AGENT")]
@@ -50,8 +50,8 @@ class Run(WatchOptions):
     a trained agent: a folder of `care-sim train`, a file of weights, or a name of `care-sim list
     agents`."""
     scenario: str | None = None
-    """For an agent: another scenario or source than that of its training. What the agent learned
-    with then does not count."""
+    """For an agent: another scenario or source than that of its training. The settings of its
+    training then do not count."""
     policy: str | None = None
     """`care-sim list policies` lists them; care unless given. `full` always runs with budget
     1.0."""

@@ -76,7 +76,7 @@ def scene_of(options: WatchOptions, source: Source) -> Scene:
     if options.scene is not None:
         check_known("scene", options.scene, scenes)
     chosen = next(iter(scenes.values())) if options.scene is None else scenes[options.scene]
-    # Of a recording the seed draws the faults and the floor alone; a street is its seed.
+    # The seed of a recording draws only the faults and the floor; a street is its seed.
     kind: Any = SOURCES.maker(source.kind)
     if issubclass(kind, Recordings):
         return chosen._replace(seed=seed)

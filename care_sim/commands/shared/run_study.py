@@ -63,7 +63,7 @@ def play_study(
     out = options.out or usual or free_folder(folder, configs, study)
     again = command_line(replace(options, out=out))
     failures = run_study(configs, out, options.workers, make_executor, study, options.force, again)
-    # What is printed is read back from the folder, as `care-sim report` would print it.
+    # Read the rows back from the folder, as `care-sim report` would print them.
     if len(failures) < len(configs):
         rows, _, missing = read_results(out)
         print_report(rows, TableConsole(), study, missing, verbose=options.verbose)

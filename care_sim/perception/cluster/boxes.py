@@ -161,8 +161,8 @@ def _misfits(sides: Sides, seen: Floats, sensor_height_m: float, grid: Grid) -> 
     A side should not look longer than the body, nor shorter than its connected part.
     """
     # Either end of a side lies anywhere within half a step of its last point: a variance of
-    # step^2 / 12 each, and step^2 / 6 for both. Of the height only the top is uncertain, so its
-    # step is taken smaller by sqrt(2).
+    # step^2 / 12 each, and step^2 / 6 for both. Only the upper end of a height is uncertain, so its
+    # step is divided by sqrt(2).
     range_m = sides.range_m
     steps = np.array([grid.column_width, grid.column_width, grid.row_height / np.sqrt(2)]) * range_m
 

@@ -50,7 +50,7 @@ class ClusterDetector:
 
     Recall on six generated streets, of objects with three returns or more: 93% to 15 m, 59% from
     there to 30 m, 44% from there to 50 m. Parts of cars in a parked row are taken for pedestrians
-    or bicycles. Of 29 detections per keyframe 16 match no such object.
+    or bicycles. The detector reports 29 boxes per keyframe, of which 16 match no such object.
     """
 
     far = False
@@ -72,8 +72,8 @@ class ClusterDetector:
         standing = points[above]
         heights = heights[above]
 
-        # Clusters with fewer points than the proxy needs, or that fit no class, are dropped. Of two
-        # candidates at one place the one with more points stays.
+        # Clusters with fewer points than the proxy needs, or that fit no class, are dropped. The
+        # candidate with more points stays if two are at one place.
         clusters = [
             rows for rows in clusters_of(standing[:, :2], self._grid) if len(rows) >= MIN_RETURNS
         ]
@@ -108,8 +108,8 @@ def _drop_overlaps(found: list[_Candidate]) -> list[_Candidate]:
 
     Examples are a windscreen behind a bonnet, and a side seen too obliquely to be connected.
     """
-    # Those with the most points come first, then the nearest. The distance is rounded, so that the
-    # order of equal ones is not that of their last bits.
+    # Candidates with the most points come first, then the nearest. The distance is rounded, so that
+    # the order of equal ones is not that of their last bits.
     kept: list[_Candidate] = []
     for candidate in sorted(
         found, key=lambda one: (-one.points, np.round(np.hypot(*one.place), DECIMALS))

@@ -22,7 +22,8 @@ from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud
 
 GATHERED_S = 1.0
 """In the closed loop, and in films with short keyframes, a detector that gathers ten sweeps has
-those of the last ten keyframes, of 0.1 s each. Of longer ones it has as many as fit in this time.
+those of the last ten keyframes, of 0.1 s each. With longer keyframes it has as many as fit in this
+time.
 """
 
 

@@ -31,8 +31,8 @@ from care_sim.perception.measured.tables import Measurement
 from care_sim.sensors.annotated import Annotations, Cloud
 
 FREE_WIDTH_M, FREE_LENGTH_M = 3.0, 20.0
-"""Width and length of the road ahead, where false boxes are rare. Of 1,342 false boxes with a score
-of at least 0.3 none were there; an even spread would give 8.5.
+"""Width and length of the road ahead, where false boxes are rare. None of 1,342 false boxes with a
+score of at least 0.3 was there; an even spread would give 8.5.
 """
 SHORT_M = 0.5
 """A ray may end this far before the road or the box, as at a kerb."""

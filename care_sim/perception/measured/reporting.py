@@ -41,10 +41,10 @@ def report_objects(
 
     The `clock` holds the episode's seed and the keyframe. `present` are numbers, classes and rows
     of memory (n,) of objects with `boxes` (n, 7). `returned` are the objects of all returns (P,),
-    the present ones in ascending order, the place of each in it, and the number of sweeps. Of the
-    `heads` (h,), bounds (h + 1,) split the returns by LiDAR, and angles (h,) weigh them. `gathered`
-    are returns (m, k) at the last keyframes, in the column of the keyframe modulo k, and their
-    weights (k,), newest first.
+    the present ones in ascending order, the place of each in it, and the number of sweeps. The
+    bounds (h + 1,) in `heads` split the returns by LiDAR, and the angles (h,) weigh them.
+    `gathered` are returns (m, k) at the last keyframes, in the column of the keyframe modulo k, and
+    their weights (k,), newest first.
     """
     (seed, keyframe), (objects, classes, places) = clock, present
     hits, ascending, ranks, sweeps = returned

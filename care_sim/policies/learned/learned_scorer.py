@@ -46,7 +46,7 @@ class LearnedScorer(Policy):
         weights.check(self.name, rig)
         self._inputs = CellInputs(rig)
         self._network = CellNetwork(weights, self._inputs.rig_inputs)
-        # What exploitation leaves, as Algorithm 1 rounds it.
+        # The reserve is the rest after exploitation, as Algorithm 1 rounds it.
         self._reserve = rig.budget - half_up((1 - rig.reserve_fraction) * rig.budget)
 
     def demand(self, belief: Belief) -> Demand:
@@ -85,8 +85,8 @@ def _by_code(layer: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def highest(scores: NDArray[np.float32], count: int) -> Cells:
-    """Return the `count` cells of the highest scores, ascending. Of equal scores the lowest index
-    is taken.
+    """Return the `count` cells of the highest scores, ascending. If scores are equal, the lowest
+    index is taken.
     """
     if not 0 < count < len(scores):
         return np.arange(len(scores))[:count]

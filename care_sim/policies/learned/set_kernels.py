@@ -144,7 +144,7 @@ def best_cells(
         pieces.ends[count] = pieces.begins[count] + strips.shape[1]
         count += 1
 
-    # Of equal pieces the first: the result does not depend on the machine's sort.
+    # Take the first of equal pieces: the result does not depend on the machine's sort.
     chosen = np.empty(budget, np.int64)
     found = 0
     for piece in np.argsort(-pieces.rates[:count], kind="mergesort"):

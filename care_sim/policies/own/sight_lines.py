@@ -128,8 +128,8 @@ def _moved(
             middle = math.floor((math.atan2(y, x) - turned - grid.right) / grid.column_width)
 
             # A nearer surface covers more than its one column. The width is rounded up, so that no
-            # gap opens in a wall: an approaching surface grows by a column on either side. Of two
-            # surfaces behind each other the nearer one counts.
+            # gap opens in a wall: an approaching surface grows by a column on either side. The
+            # nearer of two surfaces behind each other counts.
             half = math.ceil((before / now - 1) / 2 - _LAST_BITS)
             for covered in range(middle - half, middle + half + 1):
                 place = covered % grid.turn

@@ -51,7 +51,7 @@ class HistoryUniform(Policy):
 
     def __init__(self, rig: Rig):
         super().__init__(rig)
-        # What exploitation leaves, as Algorithm 1 rounds it.
+        # The reserve is the rest after exploitation, as Algorithm 1 rounds it.
         reserve = rig.budget - half_up((1 - rig.reserve_fraction) * rig.budget)
         self._pattern = uniform_pattern(rig.grid, reserve)
 

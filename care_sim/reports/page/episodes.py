@@ -93,8 +93,8 @@ def replay_episodes(
                 show(done, "")
         return [Episode(row, _ending(future)) for row, future in zip(rows, futures, strict=True)]
     finally:
-        # After an interrupt the episodes that wait are not begun. Those that are being played end
-        # first.
+        # After an interrupt the episodes that wait are not begun. Episodes that are being played
+        # end first.
         executor.shutdown(cancel_futures=True)
 
 

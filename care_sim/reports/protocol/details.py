@@ -51,7 +51,7 @@ def thirds_tables(plays: SettingPlays) -> list[Table]:
 
 def _ranking_lines(plays: SettingPlays, column: str) -> Iterator[TableRow]:
     yield (f"{RANKINGS[column]} a keyframe",)
-    # What a third means in numbers comes before what differs in it. Dense first, as in the paper.
+    # The counts of each third come before the differences in it. Dense first, as in the paper.
     for name in reversed(SCENE_THIRDS):
         yield (f"{name} third", *(_mean_count(plays, column, name, b) for b in plays.budgets))
     said = claims_about(plays.setting)

@@ -90,9 +90,9 @@ class SettingPlays(Part):
         if found is None or found.interval or measure not in _OF_EVENTS:
             return found
         # Scenes are the unit that is resampled, because the events of one scene are not
-        # independent. Of fewer scenes no interval is printed, and events stand in for them.
-        # Both policies have the same events in a scene, in the same order, so that the joined
-        # arrays are paired event by event.
+        # independent. Too few scenes give no interval, and events replace them as the unit. Both
+        # policies have the same events in a scene, in the same order, so that the joined arrays are
+        # paired event by event.
         shared = sorted({*self.tallies(ours, budget)} & {*self.tallies(theirs, budget)})
         events = [
             np.concatenate(

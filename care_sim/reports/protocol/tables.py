@@ -170,7 +170,7 @@ _RATIOS = {"first sightings %": FIRST_SIGHTING, "overall %": OVERALL, "TTFD": TT
 
 def protocol_tables(rows: Sequence[Row]) -> list[Table]:
     """All tables, one setting after the other."""
-    # What answers the main question comes first: differences, then levels, then details.
+    # The answer to the main question comes first: differences, then levels, then details.
     made: list[Callable[[SettingPlays], list[Table]]] = [
         earlier_tables,
         protocol_contrast_tables,

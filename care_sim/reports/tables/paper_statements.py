@@ -1,8 +1,8 @@
 """Every statement of the paper's Sec. 5.6 beside what a study measured, as pure functions of its
 rows.
 
-Numbers are medians in metres; a median that is not detected ranks below every other. What the paper
-says in words is put as a bound, which the statement names.
+Numbers are medians in metres; a median that is not detected ranks below every other. Where the
+paper uses words and no number, the statement names a bound.
 """
 
 import math

@@ -71,8 +71,8 @@ class _Block:
     """A headline table, or a measure of the open loop at a budget, with the policies that were
     played, and CARE beside each that joined in.
 
-    `label` names its orders, below a heading with the measure where there are several. Of several
-    places these are drawn, and not their seeds.
+    `label` names its orders, below a heading with the measure where there are several. If there are
+    several places, intervals resample the places, not their seeds.
     """
 
     def __init__(

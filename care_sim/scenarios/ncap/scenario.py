@@ -117,7 +117,7 @@ class Ncap(Scenario):
         """
         if self.speed_kph:
             return self
-        # Of a copy, since a generator counts what it spawns.
+        # Spawn from a copy, since a generator counts what it spawns.
         own = deepcopy(rng).spawn(1)[0]
         name = str(own.choice(list(TESTS))) if self.test == DRAWN else self.test
         known = TESTS[name].variations

@@ -237,8 +237,8 @@ def _take_nearer(
     surface: Floats,
 ) -> None:
     """The depth test from the column `first` to the one before `end`: what is nearer than all
-    before it, at an inverse depth of at most `greatest`, takes the pixel. Of equal depths the later
-    part does.
+    before it, at an inverse depth of at most `greatest`, takes the pixel. The later of two parts
+    with equal depths takes it.
     """
     for column in range(np.uint64(first), np.uint64(end)):
         depth = inverse_depths[column]

@@ -16,8 +16,8 @@ from care_sim.world.bullet import NO_BODY
 
 _X, _Y, _Z = np.uintp(0), np.uintp(1), np.uintp(2)
 _STRIDE_BITS = 5
-"""A stride is 2 to the power of this many cells. Of each the first fired cell is known; within one
-they are searched one by one.
+"""A stride is 2 to the power of this many cells. The first fired cell of each stride is known;
+cells within a stride are searched one by one.
 """
 
 

@@ -157,7 +157,7 @@ def _lay_planes(
         # The ray of pixel (u, v) at the depth z is q = z * (1, (across - u) / focal,
         # (down - v) / focal). Put into n' . q = h and solved for 1 / z:
         #     1 / z = (ahead + left * (across - u) / focal + up * (down - v) / focal) / h.
-        # What stands with u, what stands with v, and the rest:
+        # The factor of u, the factor of v, and the rest:
         planes[n, 0] = -left / lens.focal / offset
         planes[n, 1] = -up / lens.focal / offset
         planes[n, 2] = (ahead + (left * lens.across + up * lens.down) / lens.focal) / offset

@@ -7,9 +7,9 @@ Forecasting"; the layout and the taxonomy are those of its Sensor Dataset guide.
 every keyframe (`sensors/lidar/TIMESTAMP.feather`). Pictures are those of the boxes in any case.
 
 Boxes without a recorded LiDAR point inside are left out, as the official evaluation leaves them
-out: nobody saw those objects there. Those of the first keyframe are in `Film.hidden`, since the
-objects were present. With `empty_boxes` they are annotated. Static surroundings are not annotated,
-so only what is annotated occludes.
+out: nobody saw those objects there. Such boxes of the first keyframe are in `Film.hidden`, since
+the objects were present. With `empty_boxes` they are annotated. Static surroundings are not
+annotated, so only what is annotated occludes.
 """
 
 import os
@@ -203,8 +203,8 @@ def _keyframes(sweeps: Integers, posed: Integers) -> Integers:
 
 def _nearest(stamps: Integers, moments: Integers) -> Integers:
     """(m,) the nearest of ascending `stamps` (n,) to every one of `moments` (m,)."""
-    # The first stamp that is not earlier, and the one before it; a single stamp is both. Of two
-    # that are as near the earlier counts.
+    # The first stamp that is not earlier, and the one before it; a single stamp is both. The
+    # earlier of two equally near stamps counts.
     row = np.clip(np.searchsorted(stamps, moments), 1, max(len(stamps) - 1, 1))
     before = stamps[row - 1]
     after = stamps[np.minimum(row, len(stamps) - 1)]
@@ -248,8 +248,8 @@ def _bodies(boxes: Columns, sweep: int) -> tuple[list[AnnotatedBody], Mask]:
 
 @dataclass(frozen=True)
 class Argoverse2(Recordings):
-    """Argoverse 2 sensor logs; a scene is a log. Of a download, those in its folder `split`; in
-    `train` and `val` unless it is given. With `empty_boxes` also boxes without a recorded point are
+    """Argoverse 2 sensor logs; a scene is a log. The source reads the folder `split` of a download,
+    or `train` and `val` without it. With `empty_boxes` also boxes without a recorded point are
     annotated.
     """
 

@@ -32,7 +32,7 @@ NUSCENES_CATEGORIES: dict[str, str | None] = {
     "vehicle.emergency.police": None,
     "vehicle.motorcycle": None,
     "vehicle.trailer": None,
-    # What nuScenes-lidarseg adds to the table.
+    # Categories that nuScenes-lidarseg adds to the table.
     "flat.driveable_surface": None,
     "flat.other": None,
     "flat.sidewalk": None,

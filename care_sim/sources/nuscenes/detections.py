@@ -134,8 +134,8 @@ def _rows(path: Path, content: Any) -> list[JsonRow]:
     """The rows of either form, which may be none."""
     results = content.get("results") if isinstance(content, dict) else None
     if isinstance(results, dict) and all(isinstance(rows, list) for rows in results.values()):
-        # Rows of the map do not repeat their token. What is no row stays, and is refused with its
-        # number.
+        # Rows of the map do not repeat their token. An entry that is no row stays, and is refused
+        # with its number.
         pairs = [(token, row) for token, rows in results.items() for row in rows]
         return [
             {"sample_data_token": token, **row} if isinstance(row, dict) else row
@@ -228,9 +228,9 @@ ATTRIBUTES = {
     "bicycle": ("cycle.without_rider", "cycle.with_rider"),
     "pedestrian": ("pedestrian.standing", "pedestrian.moving"),
 }
-"""The attribute of what stands, and of what moves. A bicycle that moves is ridden. Of the eight
-official attributes two are left out, a vehicle that only stopped and a person who sits: a box and
-its speed cannot tell them.
+"""The attribute of what stands, and of what moves. A bicycle that moves is ridden. Two of the eight
+official attributes are left out, a vehicle that only stopped and a person who sits: a box and its
+speed cannot tell them.
 """
 
 

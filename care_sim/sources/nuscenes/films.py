@@ -5,9 +5,9 @@ A scene without any recorded sweep is played on its boxes, like Argoverse 2 logs
 bodies, also those outside the five classes. Rays are cast at the bodies, and the recorded cameras
 render them. Static surroundings are not annotated, so only boxes occlude.
 
-Boxes without a LiDAR or radar point inside are left out, as in the official evaluation. Those of
-the first keyframe are in `Film.hidden`, since the objects were present. They are no bodies either:
-their place is not measured, and a ray would hit objects that the LiDAR did not reach. With
+Boxes without a LiDAR or radar point inside are left out, as in the official evaluation. Such boxes
+of the first keyframe are in `Film.hidden`, since the objects were present. They are no bodies
+either: their place is not measured, and a ray would hit objects that the LiDAR did not reach. With
 `empty_boxes` they are annotated, and bodies.
 
 The car's motion is that of the keyframes' poses. Pictures are taken within 50 ms of the sweep

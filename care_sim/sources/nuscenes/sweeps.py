@@ -80,7 +80,7 @@ def recorded_cloud(
     points: Floats, grid: AngularGrid, annotations: Annotations, sensor: Frame
 ) -> Cloud:
     """Return the points that a ray of `grid` could have returned, each with the annotated box that
-    it lies in. Points are (n, 3), or (n, 5) with intensities and rings. Those beyond the reach are
+    it lies in. Points are (n, 3), or (n, 5) with intensities and rings. Points beyond the reach are
     far.
     """
     near, far = (
@@ -112,7 +112,7 @@ def points_of_grid(points: Floats, grid: AngularGrid, beyond: bool = False) -> t
     cells = grid.cells_of(points[:, :3])
     reached = ranges > grid.range_m if beyond else ranges <= grid.range_m
     (kept,) = np.nonzero((cells >= 0) & (ranges > OWN_CAR_M) & reached)
-    # Of several points in a cell all stay.
+    # All points of a cell stay.
     order = kept[np.argsort(cells[kept], kind="stable")]
     return cells[order], points[order]
 

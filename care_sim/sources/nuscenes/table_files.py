@@ -222,8 +222,8 @@ class SampleStore:
         try:
             return self._read(query, *values)
         except sqlite3.DatabaseError as error:
-            # What cannot be opened may have been deleted; what can and cannot be read is damaged.
-            # It is made again, once.
+            # A file that cannot be opened may have been deleted; a file that opens and cannot be
+            # read is damaged. It is made again, once.
             if not isinstance(error, sqlite3.OperationalError):
                 self._file.unlink(missing_ok=True)
             self._file = self._kept(*self._key)

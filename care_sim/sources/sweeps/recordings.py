@@ -39,8 +39,8 @@ def log_of_bag(path: Path, topics: Sequence[str]) -> Log:
     """Return the log in a bag: its points, and the poses of the car from odometry or stamped poses.
     Times are those of the messages' headers.
 
-    Of several topics of a kind `topics` names the right one. Points are in the LiDAR's axes: no
-    transform is applied to them. A message that was logged twice counts once.
+    If a bag has several topics of a kind, `topics` names the right one. Points are in the LiDAR's
+    axes: no transform is applied to them. A message that was logged twice counts once.
 
     Raises InvalidInput for a bag that cannot be read, and for topics that are missing or ambiguous;
     then it lists them. Raises MissingExtra without the extra `rosbags`.

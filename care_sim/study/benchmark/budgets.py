@@ -50,10 +50,10 @@ BUDGET_MARK = "care_sim_b90"
 """The key by which a file is known; its value is the version of the score."""
 BUDGET_VERSION = 1
 MAIN_DETECTOR = "centerpoint"
-"""The detector of the published entries."""
+"""The detector under which entries are ranked."""
 STREETS_PLAYED, QUICK_STREETS = 80, 24
-"""Streets of the score, and those of a trial. Of 80 the interval of the best policy is a fifth of
-its B90."""
+"""Streets of the score, and those of a trial. With 80 streets the interval of the best policy is a
+fifth of its B90."""
 EPISODES_PLAYED = {DRIVES: 24, TESTS: 40}
 """Worlds of the closed loop, where they are played too."""
 REFERENCE_ENTRIES = (

@@ -14,8 +14,8 @@ is wide.
 WEDGE_M = 30.0
 """Length at which a wedge, which has no depth, is drawn."""
 MOST_POINTS = 6000
-"""Most returns drawn. Of more, only every second or third is drawn: full scans would fill 9 MB in 6
-s.
+"""Most returns drawn. If there are more, only every second or third is drawn: full scans would fill
+9 MB in 6 s.
 """
 
 ENTITIES = {

@@ -88,9 +88,9 @@ def recorded(data: Path) -> Iterator[Sweep]:
 
 
 def past_boxes(path: Path) -> Table:
-    """What the rays of the upper LiDAR return that meet a labelled box within range first: on it,
-    up to EDGE_M off it; from behind; from before it, where something hides it; or nothing. The
-    rays are those of the grid, which has as many as the LiDAR.
+    """Tabulate the returns of the upper LiDAR's rays that meet a labelled box within range first. A
+    return lies on the box, up to EDGE_M off it; behind it; before it, where something hides it; or
+    there is none. The rays are those of the grid, which has as many as the LiDAR.
     """
     read = argoverse2_points(path)
     points = read[read[:, 4] < UPPER_LASERS, :3] - UP_LIDAR
@@ -190,7 +190,7 @@ def counted(classes: np.ndarray, ranges: np.ndarray, returns: np.ndarray) -> Cou
 
 
 def of_shots(shots: list[Shot]) -> Counts:
-    """Those of generated streets."""
+    """The returns of objects in generated streets."""
     columns = []
     for shot in shots:
         objects = shot.annotations.objects
@@ -201,7 +201,7 @@ def of_shots(shots: list[Shot]) -> Counts:
 
 
 def of_nuscenes(folder: Path) -> Counts:
-    """Those that nuScenes counted, as if its turn had the grid's columns."""
+    """The returns that nuScenes counted, as if its turn had the grid's columns."""
     read = {
         name: {row["token"]: row for row in json.loads((folder / f"{name}.json").read_text())}
         for name in ("sample_annotation", "instance", "category", "sample_data", "ego_pose")
@@ -225,8 +225,8 @@ def of_nuscenes(folder: Path) -> Counts:
 def judged(
     detector: ClusterDetector | PillarsDetector, sweep: Sweep, least: float
 ) -> tuple[dict[str, str], float]:
-    """Boxes of a detector within range and what they find; and its precision on cars. Of all that
-    it suspects, how many cars it finds while `least` of its boxes of cars are right.
+    """Boxes of a detector within range and what they find; and its precision on cars. The last
+    count takes all suspected boxes: cars found while a share `least` of the boxes of cars is right.
     """
     suspected = detector.detect(sweep.points, sweep.height_m)
     suspected = suspected.take(np.hypot(*suspected.boxes[:, :2].T) <= RANGE_M)

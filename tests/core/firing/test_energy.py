@@ -81,7 +81,7 @@ def test_the_floor_comes_after_the_last_shot_of_the_last_demanded_cell():
     st.integers(0, 10),
 )
 def test_an_action_can_ask_for_any_number_of_shots_of_every_cell(asked, more):
-    """What is left goes on top of what was asked for."""
+    """Shots that are left go on top of the shots that the action demanded."""
     cells, counts = (np.array([pair[n] for pair in asked], np.int64) for n in (0, 1))
     action = scores_of(cells, GRID.shape, counts)
     exact = shots("energy:4", action, int(counts.sum()))

@@ -48,7 +48,7 @@ def test_cells_are_those_of_the_reference(floor, size, batches):
 @given(drawn_floors, st.sets(st.integers(0, 399)), st.integers(0, 400))
 @example(Floor(1, 2, 3), {5, 6}, 400)
 def test_a_reader_takes_the_first_free_cells_of_the_order(floor, demanded, budget):
-    """Of so many cells that a whole order takes many batches."""
+    """A whole order of so many cells takes many batches."""
     order = floor_order(floor, 400).tolist()
     assert sorted(order) == [*range(400)]
     chosen = np.isin(np.arange(400), [*demanded])
@@ -84,7 +84,7 @@ def test_every_cell_of_a_grid_is_equally_frequent():
 
 
 def test_no_cell_is_drawn_more_often_because_the_words_do_not_divide():
-    """Of 2^32 words each third cell of so many would have 2, and the others 3."""
+    """With 2^32 words one of three of so many cells would have 2, and the others 3."""
     cells = np.concatenate([draw_cells(Floor(7, 8, k), 0, 3 * 2**29) for k in range(40)])
     assert abs(deviation(Counter((cells % 3).tolist()), 3)) < LIKELY
 

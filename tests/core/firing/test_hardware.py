@@ -1,4 +1,4 @@
-"""What all hardware keeps to, and what each fires of demands made by hand."""
+"""Rules that all hardware keeps, and the cells that each fires of demands made by hand."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def at(*places, grid=GRID):
 
 
 def fired(name, demand, units, floor=None, last=NOTHING, grid=GRID):
-    """What the hardware fires of cells in their order, with a budget of so many units."""
+    """The cells that the hardware fires of a demand in order, with a budget of so many units."""
     hardware = hardware_of(name, grid)
     return hardware.fire(
         scores_of(demand, grid.shape), units * hardware.unit_cells, floor, last
@@ -114,7 +114,7 @@ def test_the_order_of_a_demand_is_that_of_its_scores(scores):
 
 
 def test_blocks_by_hand():
-    """Of tiles of 2 x 3 the first two cells share one, and the fourth comes too late."""
+    """The first two cells share one of the tiles of 2 x 3, and the fourth comes too late."""
     demand = at((0, 1), (1, 2), (5, 11), (3, 3))
     tile = [*range(3), *range(12, 15)]
     last_tile = [cell for row in (4, 5) for cell in range(row * 12 + 9, row * 12 + 12)]

@@ -1,4 +1,4 @@
-"""What a vector environment promises besides the episodes."""
+"""Promises of a vector environment besides the episodes."""
 
 import copy
 import gc

@@ -55,7 +55,7 @@ CONDITIONS = {
     "drive": ("CARE-Drive-v0", {"duration_s": 1.0, "reserve_fraction": 0.0}),
 }
 BUDGETS = {"budgets": [0.02, 0.3, 0.1], "window": [0.1, 0.5, 0.2]}
-"""Of each world its own, in these conditions; else all have 3%."""
+"""Each world has its own in these conditions; in others all have 3%."""
 
 
 def given(space, steps):

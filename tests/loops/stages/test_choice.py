@@ -1,4 +1,4 @@
-"""What all worlds fire is what each fires alone, with any hardware."""
+"""All worlds together fire what each fires alone, with any hardware."""
 
 import numpy as np
 from hypothesis import example, given

@@ -27,7 +27,7 @@ SCENARIOS = [
     ("r157", {}),
 ]
 NOT_TOGETHER = {"cutin"}
-"""Whose worlds move by their own Python."""
+"""Scenarios whose worlds move by their own Python."""
 
 
 class Batch:
@@ -78,7 +78,7 @@ class Batch:
 
 
 def assert_alike(world, other):
-    """What anybody may read off both is the same."""
+    """All that anybody may read off both is the same."""
     for read in (
         lambda one: (one.time, one.ego_motion, one.ego.pose, one.along_m, one.ego.speed),
         lambda one: [actor.pose_at(one.time) for actor in one.actors],

@@ -1,4 +1,4 @@
-"""What many policies are told is what each of them would be told alone, to the last bit."""
+"""Many policies together observe what each would observe alone, to the last bit."""
 
 import numpy as np
 from gymnasium.vector.utils import create_empty_array
@@ -42,14 +42,16 @@ def tracks(rng, count, reach):
 
 
 def told(egos, seen, known, live):
-    """What `Observing` writes of worlds, over ones, and what each would be told alone."""
+    """The observations that `Observing` writes of worlds, over ones, and those that each would get
+    alone.
+    """
     state = State(len(egos))
     state.live[:] = live
     state.read[:] = np.clip(egos, *Limits(RIG).ego)
     observed = create_empty_array(observation_space(RIG), len(egos), np.ones)
     tables = []
     for parts in (seen, known):
-        # What lies beyond the rows in use means nothing.
+        # Rows beyond those in use mean nothing.
         rows = np.full((len(egos), max(map(len, parts)) + 2, parts[0].shape[1]), np.nan)
         for world, part in enumerate(parts):
             rows[world, : len(part)] = part

@@ -17,7 +17,7 @@ DT = 0.1
     ("people", "spread", "line"), [(12, 4.0, 2), (12, 4.0, 5), (40, 200.0, 3), (300, 500.0, 2)]
 )
 def test_crowds_are_tracked_as_in_a_single_world(people, spread, line):
-    """Of 300 that are new at every keyframe there are soon more than a table has rows."""
+    """If 300 are new at every keyframe, there are soon more than a table has rows."""
     worlds, keyframes = 3, 8
     draw = np.random.default_rng(people)
     state = State(worlds)

@@ -53,7 +53,7 @@ def test_there_are_as_many_as_measured_and_they_last_as_long(name):
             # A few are lost on the road ahead, and where nothing returns.
             spread = 4 * np.std(counts) / np.sqrt(len(counts) / 6) + 0.1 * rate
             assert np.mean(counts) == pytest.approx(rate, abs=spread), (kind.label, score)
-    # Of the people from 0.3 found again within 2 m after 0.5 s: 65 and 42% were measured.
+    # People from 0.3 on are found again within 2 m after 0.5 s: 65 and 42% were measured.
     kind = next(one for one in measurement(name).false_boxes if CLASSES[one.label] == "pedestrian")
     again = []
     for (now, own, scores), (then, other, after) in pairwise(frames):
@@ -182,7 +182,7 @@ def test_of_gathered_sweeps_the_last_one_looks():
 
 
 def test_every_lidar_looks_from_its_own_place():
-    """Of two LiDARs only the second fires, 20 m to the left, into a sector ahead."""
+    """Only the second of two LiDARs fires, 20 m to the left, into a sector ahead."""
     grid, place = AngularGrid(), (0.0, 20.0, 0.0)
     ahead = np.flatnonzero(np.abs(np.arctan2(*DIRECTIONS.T[1::-1])) < 0.3)
     cloud = Cloud(ahead + grid.size, place + 60 * DIRECTIONS[ahead], np.full(len(ahead), NO_OBJECT))

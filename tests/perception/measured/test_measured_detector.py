@@ -80,7 +80,7 @@ def test_who_was_away_for_a_keyframe_is_a_newcomer_again():
 
 @pytest.mark.parametrize("keyframes", [1, 4, 10, 15])
 def test_in_the_closed_loop_the_last_ten_keyframes_count(keyframes):
-    """Of a newcomer a part of ten sweeps: its disadvantage follows."""
+    """A newcomer has a part of ten sweeps: its disadvantage follows."""
     detector = begun("centerpoint", 0.1, False, **WORTH_ONE)
     found = share(detector, crowd(), *[0] * 12, *[8] * keyframes)
     # As steady as an object with so many returns.

@@ -1,4 +1,4 @@
-"""What was asked for comes back: the targets of boxes, read as an answer, are these boxes."""
+"""The targets of boxes, read as an answer, are these boxes."""
 
 import numpy as np
 import pytest

@@ -132,9 +132,9 @@ def test_place_takes_the_highest_of_its_map(tmp_path):
 
 
 HULL = [row * GRID.columns + column for row in range(7, 14) for column in range(249, 263)]
-"""Of a car 1.95 m wide whose rear is 17.7 m ahead: 3.2 degrees, 4.5 columns, to either side, and 2
-columns of margin. From 1.85 m below the sensor there, -6.0 degrees, to 0.15 m below it at its front
-22.3 m away, -0.4 degrees: rows 8 to 12, and 1 row of margin.
+"""The hull of a car 1.95 m wide whose rear is 17.7 m ahead: 3.2 degrees, 4.5 columns, to either
+side, and 2 columns of margin. From 1.85 m below the sensor there, -6.0 degrees, to 0.15 m below it
+at its front 22.3 m away, -0.4 degrees: rows 8 to 12, and 1 row of margin.
 """
 
 

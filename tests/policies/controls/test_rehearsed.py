@@ -1,4 +1,4 @@
-"""What an agent does that has played the scenario before, unless there is a secret."""
+"""The actions of an agent that has played the scenario before, unless there is a secret."""
 
 from contextlib import closing
 from dataclasses import dataclass

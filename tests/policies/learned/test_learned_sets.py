@@ -204,8 +204,8 @@ def test_more_returns_ask_for_more_cells(drawn, environment):
 
 
 def test_a_track_that_was_just_seen_is_worth_less(environment, belief_of, car):
-    """Of two alike the one that was missed longer is served first; with nothing for either none
-    is."""
+    """If two tracks are alike, the one that was missed longer is served first; with nothing for
+    either none is."""
     rows = [car(1, 12, 9, misses=0), car(2, 12, -9, misses=9)]
     belief = replace(belief_of(rows), budget=6)
     policy = care_sim.make_policy("learned-sets", environment)

@@ -57,7 +57,9 @@ def test_what_is_written_is_read_back_bit_for_bit(saved):
 
 
 def test_weights_of_another_set_up_are_refused_in_one_line(tmp_path):
-    """By its hash: another name for the same is none. What does not tell its set-up fits any."""
+    """By its hash: another name for the same is none. Weights that do not name their set-up fit
+    any.
+    """
     bumper = SensorSetup("bumper", position=(2.0, 0.0, 0.6))
     card = Card("ppo", AngularGrid(), setup=bumper.label)
     save_weights(tmp_path / "w.npz", ARRAYS, card)

@@ -1,4 +1,4 @@
-"""What the policies of our own ask for: rounds, layers, cores."""
+"""The demands of our own policies: rounds, layers, cores."""
 
 import gymnasium
 import numpy as np
@@ -86,8 +86,8 @@ def test_the_sector_is_as_wide_as_a_street_at_50_m():
 
 @pytest.mark.parametrize(("columns", "ahead"), [(5, [2]), (36, [17, 18]), (12, [])])
 def test_the_sector_of_a_coarse_grid(columns, ahead):
-    """Odd: one column lies straight ahead. Of 36 the first middles lie 5 degrees off and the next
-    15; of 12 already the first lie 15 off.
+    """Odd: one column lies straight ahead. The first middles of 36 columns lie 5 degrees off and
+    the next 15; the first of 12 already lie 15 off.
     """
     assert sorted(columns_ahead(AngularGrid(columns, 16))) == ahead
 

@@ -1,4 +1,4 @@
-"""What units are worth, and how many shots known targets take; numbers by hand."""
+"""The worth of units, and how many shots known targets take; numbers by hand."""
 
 from dataclasses import replace
 
@@ -33,7 +33,7 @@ def test_with_free_cells_it_is_care_sightlines(encounter, environment):
 
 @pytest.fixture
 def asks(monkeypatch):
-    """What the allocator would take of `care-sightlines`, in order, is these cells."""
+    """The cells that the allocator would take of `care-sightlines`, in order, are these."""
 
     def asked(*cells):
         demand = Demand(layers=[[np.array(cells)]])
@@ -49,7 +49,7 @@ def asks(monkeypatch):
         ("rows", (0, 13, 26, 5), 24, [0, 1]),
         # Five count 5 down to 1: the last three, of one row, are worth more than the first.
         ("rows", (0, 13, 24, 25, 26), 12, [2]),
-        # Of columns 0 and 1 both first cells are worth 3 + 2; the seam lies between.
+        # The first two cells are worth 3 + 2; the seam lies between their columns.
         ("azimuth-window:180", (11, 0, 6), 12, [11, 0]),
         # Rows 4 and 5 together are worth more than row 0 and its neighbour, the best row alone.
         ("vertical-window", (0, 48, 60, 61), 24, [4, 5]),

@@ -211,7 +211,7 @@ def test_along_a_street_lines_of_sight_are_open_however_the_lidar_is_mounted(hei
 
 @pytest.mark.parametrize(("pitch", "roll"), [(0, 0), (-8, 6)])
 def test_every_column_has_the_cell_at_which_things_enter_the_range(pitch, roll):
-    """Of rows 1.33 degrees apart the nearest looks no more than 0.67 degrees off."""
+    """Rows are 1.33 degrees apart, so that the nearest looks no more than 0.67 degrees off."""
     grid = AngularGrid(top=0.6, bottom=-0.6, pitch=np.deg2rad(pitch), roll=np.deg2rad(roll))
     cells = entry_cells(Rig(grid))
     assert (cells % grid.columns).tolist() == [*range(grid.columns)]

@@ -15,7 +15,7 @@ from tests.helpers.made_rows import NEAREST_M, rows
 
 
 def contrast(measure, ours, theirs, **more):
-    """Of rows."""
+    """The contrast of rows."""
     return contrasts.contrast(measure, measure.units(ours), measure.units(theirs), **more)
 
 
@@ -111,7 +111,7 @@ def test_equal_scene_weights_count_scenes():
 
 
 def test_of_few_scenes_the_interval_comes_from_events_averaged_over_floor_seeds():
-    """Of 30 events CARE finds 12 and 6 with its two floors, three more a keyframe late, and history
+    """CARE finds 12 and 6 of 30 events with its two floors, three more a keyframe late, and history
     none.
     """
     rows = [

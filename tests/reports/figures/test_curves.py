@@ -1,4 +1,4 @@
-"""What all figures of curves share: which curves have names, where names and marks are."""
+"""All figures of curves share which curves have names, and where names and marks are."""
 
 from itertools import pairwise
 

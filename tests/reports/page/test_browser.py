@@ -80,7 +80,7 @@ def test_a_page_keeps_to_its_own_policy(opened, played):
 
 
 def test_a_walk_through_a_page(opened, played):
-    """What was played is said, two episodes are watched side by side, one is played to its end."""
+    """The page says what was played, shows two episodes side by side, and plays one to its end."""
     path, rows = played
     page = opened(path, READY)
     text = page.inner_text("body")
@@ -162,7 +162,7 @@ def test_a_play_of_the_open_loop_is_watched_beside_another(opened, drive, tmp_pa
 
 
 def test_a_heading_sorts_its_column_up_and_down(opened, tmp_path):
-    """What was never detected is the least."""
+    """A median that was never detected is the least."""
     medians = {"history": None, "care": 9.0, "all-camera": 10.0, "full": 7.0, "care-sbf": 8.0}
     made = [each for policy, distance in medians.items() for each in rows(policy, [distance] * 3)]
     table = opened(written(tmp_path, made, "sweep"), "true").locator("table.sortable >> nth=0")

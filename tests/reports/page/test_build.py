@@ -1,4 +1,4 @@
-"""What a page is made of, and in which order."""
+"""The parts of a page, and their order."""
 
 import re
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What a page knows of an episode is what happened in it."""
+"""A page shows of an episode what happened in it."""
 
 import json
 import signal

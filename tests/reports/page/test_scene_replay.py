@@ -1,4 +1,4 @@
-"""What a page knows of a play of the open loop is what happened in it."""
+"""A page shows of a play of the open loop what happened in it."""
 
 import json
 from concurrent.futures import ThreadPoolExecutor

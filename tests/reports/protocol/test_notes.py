@@ -26,7 +26,7 @@ def under(table, heading):
 
 
 def three_with_events():
-    """Of seven scenes three have events."""
+    """Three of seven scenes have events."""
     return [
         play(f"{n}", policy, found(events, min(sighted, events)), [sighted] * events, budget=0.2)
         for n, events in enumerate([10] * 3 + [0] * 4)

@@ -17,7 +17,7 @@ from tests.helpers.places import EXAMPLES, loaded
 
 
 def test_drives_of_several_folders_are_pooled_and_paired(tmp_path, capsys):
-    """Of 20 events a drive care finds 6 at once and history 3; drives of equal name stay two."""
+    """CARE finds 6 of 20 events per drive at once and history 3; drives of equal name stay two."""
     for number, scenes in enumerate((3, 2)):
         rows = study({"care": (6, 5), "history": (3, 5), "full": (8, 8)}, scenes=scenes)
         other = [row | {"source": "streets" if number else "nuscenes"} for row in rows]

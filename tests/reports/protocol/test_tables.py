@@ -62,7 +62,7 @@ def test_contrasts_stand_above_the_papers():
     )
     bold = [isinstance(line[1], Bold) for line in block(table, "First sightings")]
     assert bold == [True, False, False, False, True, True, False]
-    # Of 20 events a scene 7 emerge; care sees 2 of them at once, and 4 of the 13 others.
+    # Seven of 20 events per scene emerge; care sees 2 of them at once, and 4 of the 13 others.
     assert block(table, "First sightings, emerging")[0] == ("history", *["+0.0 [0.0,0.0]"] * 3)
     assert block(table, "First sightings, entering")[0] == ("history", *["+15.4 [15.4,15.4]"] * 3)
     assert block(table, "Overall recall")[0] == ("history", *["-10.0 [-10.0,-10.0]"] * 3)

@@ -107,7 +107,7 @@ def test_which_policy_was_first_and_whose_rays_it_was():
 
 
 def test_only_misses_that_the_full_scan_finds_are_given_a_reason():
-    """The full scan finds five events. Of CARE's three misses it misses one too."""
+    """The full scan finds five events. It misses one of CARE's three misses, too."""
     assert mechanism_closing(ROWS) == ["Scenes: 2, with 6 first sightings; plays: 6."]
     assert tables()["why first sightings were missed that the full scan finds"] == (
         ("care", "5", "2", "0", "1", "0", "0", "1", "0"),

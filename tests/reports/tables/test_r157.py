@@ -7,7 +7,7 @@ from tests.helpers.made_rows import CUT_INS, cut_ins
 
 
 def test_outcomes_of_every_policy_with_differences_of_pairs():
-    """Of history's three collisions at 40, 40 and 60 km/h, those at 40 and 39.5 are hits."""
+    """History collides in cut-ins at 40, 40 and 60 km/h; the impacts of 40 and 39.5 are hits."""
     outcomes, speeds = r157_tables(CUT_INS)
     assert outcomes.title == "Preventable cut-ins, driver fixed: what became of them"
     heading, history, care, fan, stride, full, wider, care_3, full_3 = outcomes.rows

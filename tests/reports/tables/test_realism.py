@@ -104,7 +104,7 @@ def test_recalls_of_the_open_loop_have_their_own_blocks():
         *study({"care": (8, 8), "history": (2, 4)}, **common),
         *study({"care": (1, 5), "history": (2, 4)}, **common, **late.changes),
         *study({"full": (9, 9)}),
-        # What comes back in fog is less for a full scan, too; another film is no changed data.
+        # Fog returns less to a full scan, too; another film is no changed data.
         *study({"care": (1, 1)}, **common, film_hash="fog", **fog.changes),
         *study({"full": (3, 3)}, film_hash="fog", **fog.changes),
     ]

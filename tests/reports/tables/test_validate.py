@@ -1,4 +1,4 @@
-"""Who is chosen, who leads whom, and whether a world discriminates, on rows made by hand."""
+"""The chosen policies, who leads whom, and whether a world discriminates, on rows made by hand."""
 
 import pytest
 

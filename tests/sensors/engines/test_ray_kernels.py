@@ -49,7 +49,7 @@ def test_no_ray_misses_what_it_would_meet_if_all_were_tried(seed, grid, tilted, 
 
 def asked_about_all(cells, grid, sensor, parts, poses):
     pose = SensorPose(*sensor)
-    # Whose reach is endless places every part.
+    # An endless reach places every part.
     placed = place_parts(pose, parts, poses, grid.spacing, np.inf)
     across, down = grid.fan
     rows, columns = np.divmod(cells, grid.columns)

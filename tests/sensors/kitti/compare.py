@@ -33,8 +33,8 @@ CONFIDENCE = 0.25
 SEEDS = 4
 STREETS, EPISODES = range(3000, 3006), 3
 CAR_HEIGHTS, PICTURE_PX, OBJECT_PX = 0.09, 7.0, 5.0
-"""What streets lack: the spread of cars' heights on KITTI, and how far the ground of a picture's
-labels, and of each label in it, is from that of a flat road.
+"""Variation that streets lack: the spread of cars' heights on KITTI, and how far the ground of a
+picture's labels, and of each label in it, is from that of a flat road.
 """
 FEWEST = 20
 """Labels in a bin, for its share to be shown."""

@@ -195,7 +195,7 @@ def test_false_boxes_last_as_long_as_measured_and_their_edges_change():
         same += ((edges[0][:, None] == edges[1]).all(axis=2) & alike).sum()
         there += len(before)
     assert stayed / there == pytest.approx(np.exp(-0.1 / 0.36), abs=0.06)
-    # Of the real detector's 75 false boxes none repeats.
+    # None of the real detector's 75 false boxes repeats.
     assert same < 0.05 * stayed
 
 

@@ -1,4 +1,4 @@
-"""What is wrong with a database is said in one line that names the file and the token."""
+"""A fault of a database is reported in one line that names the file and the token."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""What CenterPoint reported of two real scenes, played back by the detector `recorded`."""
+"""Reports of CenterPoint on two real scenes, played back by the detector `recorded`."""
 
 import csv
 import json

@@ -84,7 +84,7 @@ def written(folder, **tables):
 
 
 def read(row, table):
-    """What is read of a row."""
+    """The fields that are read of a row."""
     return {name: row[name] for name in ("token", *FIELDS[table])}
 
 

@@ -1,4 +1,4 @@
-"""What is wrong with a log is told in one line that names the file."""
+"""A fault of a log is reported in one line that names the file."""
 
 import json
 import shutil

@@ -1,4 +1,4 @@
-"""What the learned detector learns from, and what it should answer."""
+"""The training data of the learned detector, and the answers that it should give."""
 
 from contextlib import closing
 

@@ -103,7 +103,7 @@ def test_positive_and_other_examples_weigh_the_same_and_1_on_average():
 
 def test_in_a_drive_what_is_new_is_positive_until_it_has_a_track():
     """Everybody who shows in enough cells for the first time; nobody whom a full scan found at the
-    keyframe before. Who was hidden since may have lost his track.
+    keyframe before. Somebody who was hidden since may have lost his track.
     """
     with closing(DriveEnv(budget=1.0, keyframe_s=0.5)) as env:
         env.reset(seed=10_001)

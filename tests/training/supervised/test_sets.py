@@ -153,8 +153,8 @@ def test_without_faults_the_camera_has_none(monkeypatch):
 
 
 def test_what_the_labels_say_comes_true():
-    """Of a drive under way: fired so many cells of a track, its object returns three times, and not
-    before; and every object that is new in a box is one that no track has.
+    """In a drive under way an object returns three times once so many cells of its track are fired,
+    and not before. Every object that is new in a box is one that no track has.
     """
     rng = np.random.default_rng(0)
     checked = new = 0

@@ -29,7 +29,7 @@ from tests.helpers.lidars import CORNERS, STACK
 
 HEIGHT = 720
 SURROUND_HEIGHT = 860
-"""Of a rig with several cameras, whose row takes more room."""
+"""Height of the picture of a rig with several cameras, whose row takes more room."""
 
 
 def make(name, **arguments):
