@@ -11,11 +11,15 @@ tables, figure and the table of `results/b90.md` are made from the results.
 import re
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from care_sim.base.errors import report_problems
 from care_sim.base.files import write_text
 from care_sim.base.interrupts import FAILED
+from care_sim.evaluation.smallest_budget import ENOUGH
 from care_sim.reports.budgets import (
     budget_tables,
     format_budget,
@@ -26,7 +30,7 @@ from care_sim.reports.budgets import (
 from care_sim.reports.figures.budgets import BUDGETS_FIGURE, budgets_figure
 from care_sim.reports.figures.styles import save
 from care_sim.reports.recorded import sources_table
-from care_sim.reports.statements import columns_table, statements_table
+from care_sim.reports.statements import QUESTIONS, columns_table, statements_table
 from care_sim.reports.table import Table
 from care_sim.study.benchmark.bounds import BOUNDS
 from care_sim.study.benchmark.budgets import (
@@ -77,6 +81,16 @@ TRIAL = FOLDER / "trial.json"
 on all drives.
 """
 
+CONVENTIONS = {
+    "90%": np.ones(4),
+    "80%": np.full(4, 0.80 / ENOUGH),
+    "85%": np.full(4, 0.85 / ENOUGH),
+    "95%": np.full(4, 0.95 / ENOUGH),
+    "without emerging": np.array([0.0, 1.0, 1.0, 1.0]),
+}
+"""Other scores on streets: by what each count of the full scan is multiplied. A share of 80% of a
+count is one of 90% of fewer."""
+
 
 def entries_of(detector: str) -> list[BudgetResult]:
     """Return the published entries under a detector, in their order; none before it has played."""
@@ -107,6 +121,22 @@ def statements() -> list[Table]:
         if results
     }
     return [columns_table(streets), statements_table(streets)] if len(streets) > 1 else []
+
+
+def conventions() -> Table:
+    """Return the table of pairs on streets, if another share than 90% were enough, or if emerging
+    newcomers did not count.
+    """
+    streets = [one.of_part(STREETS) for one in entries_of(MAIN_DETECTOR)]
+    scored = {
+        name: [
+            replace(one, rows=tuple(row._replace(full=tuple(row.full * by)) for row in one.rows))
+            for one in streets
+        ]
+        for name, by in CONVENTIONS.items()
+    }
+    pairs = ("care-aimed", WHOLE), ("care-aimed", "care-sightlines"), *QUESTIONS
+    return statements_table(scored, pairs, "convention")
 
 
 def summary_table() -> Table:
@@ -152,6 +182,7 @@ def written() -> str:
         sources_table(main),
         *trial(),
         *statements(),
+        conventions(),
     ]
     told = "\n".join(table.markdown() for table in tables)
     return f"# B90\n\nMade by `{COMMAND}`.\n\n{told}"

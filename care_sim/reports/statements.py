@@ -84,9 +84,11 @@ def statement(columns: Columns, first: str, second: str) -> Statement:
     return Statement(first, second, fewer, more, tied)
 
 
-def statements_table(columns: Columns, pairs: Iterable[Pair] = QUESTIONS) -> Table:
+def statements_table(
+    columns: Columns, pairs: Iterable[Pair] = QUESTIONS, kind: str = "detector"
+) -> Table:
     """Return a table with a line per statement: of those `pairs` that played, then of neighbours in
-    the ranking under the first detector.
+    the ranking under the first detector. The columns may be results of another `kind`.
     """
     alike = _in_common(columns)
     main, *_ = alike.values()
@@ -102,7 +104,7 @@ def statements_table(columns: Columns, pairs: Iterable[Pair] = QUESTIONS) -> Tab
         )
         rows.append((told.first, told.second, str(told), *ratios))
     return Table(
-        f"Pairs of policies, under {counted(len(alike), 'detector')}, "
+        f"Pairs of policies, under {counted(len(alike), kind)}, "
         f"{counted(len(main[0].rows), 'world')}",
         ("policy", "needs fewer cells than", "holds", *alike),
         tuple(rows),
