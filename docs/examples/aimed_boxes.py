@@ -1,4 +1,4 @@
-"""A rule of thirty lines, to hold a policy against: rows ahead, then the middles of tracks and boxes.
+"""A rule of thirty lines, to hold a policy against: rows ahead, then middles of tracks and boxes.
 
 It treats all camera boxes alike, so it has no residual, and it remembers nothing:
 
