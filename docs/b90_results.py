@@ -10,17 +10,20 @@ tables, figure and the table of `results/b90.md` are made from the results.
 
 import re
 from argparse import ArgumentParser, Namespace
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from care_sim.base.errors import report_problems
 from care_sim.base.files import write_text
 from care_sim.base.interrupts import FAILED
+from care_sim.core.conditions import RAYS
 from care_sim.reports.budgets import (
     budget_tables,
+    budgets_table,
     format_budget,
     ideas_table,
-    parts_table,
+    least_notes,
     sorted_by_budget,
 )
 from care_sim.reports.figures.budgets import BUDGETS_FIGURE, budgets_figure
@@ -36,8 +39,9 @@ from care_sim.study.benchmark.budgets import (
     budget_worlds,
     play_budgets,
 )
-from care_sim.study.benchmark.play import player_in
-from care_sim.study.benchmark.recorded import recorded_drives
+from care_sim.study.benchmark.maker import made_by
+from care_sim.study.benchmark.play import Player, player_in
+from care_sim.study.benchmark.recorded import RECORDED, RecordedDrive, recorded_drives
 from care_sim.study.benchmark.result import (
     publish_references,
     read_list,
@@ -46,6 +50,7 @@ from care_sim.study.benchmark.result import (
 )
 from care_sim.study.benchmark.suite import STREETS, Entry
 from care_sim.study.runner import by_reason
+from care_sim.training.supervised.tuned_place import frames_of, joined, write_map
 
 PAGE = Path(__file__).parents[1] / "results" / "b90.md"
 FOLDER = PAGE.parent / "data" / "b90"
@@ -71,10 +76,11 @@ WITHOUT = {
     "core first": Entry(WHOLE, cell_order="rows-down"),
 }
 """The policy `WHOLE` with one idea removed."""
-MORE = [*BOUNDS, *(entry for entry in WITHOUT.values() if entry not in REFERENCE_ENTRIES)]
+MORE = [entry for entry in WITHOUT.values() if entry not in REFERENCE_ENTRIES]
+TUNED = Entry("tuned-place", label="tuned on the other drives")
 TRIAL = FOLDER / "trial.json"
-"""The results of bounds and of ideas that are no published entries: on the streets of a trial, and
-on all drives.
+"""The results of entries that are not published: of ideas on the streets of a trial and on all
+drives, of `TUNED` on `RECORDED` drives.
 """
 
 
@@ -87,15 +93,20 @@ def entries_of(detector: str) -> list[BudgetResult]:
 
 
 def trial() -> list[Table]:
-    """Return the tables of the worlds of `TRIAL`: the entries with the bounds, and what each idea
-    of `WHOLE` is worth.
+    """Return the tables of `TRIAL`: what each idea of `WHOLE` is worth, and the map that is tuned
+    on recorded drives beside two entries.
     """
-    played = read_list(TRIAL)
+    *played, tuned = read_list(TRIAL)
     published = references(MAIN_DETECTOR, played[0].worlds)
     known = {one.entry: one for one in [*played, *published]}
     without = {idea: known[entry] for idea, entry in WITHOUT.items()}
-    bounded = [known[entry] for entry in (*REFERENCE_ENTRIES, *BOUNDS)]
-    return [parts_table(bounded), ideas_table(known[Entry(WHOLE)], without)]
+    beside = (Entry(WHOLE), Entry(TUNED.policy))
+    compared = [tuned, *(known[entry].of_part(RECORDED) for entry in beside)]
+    title = f"B90 of a map that is tuned on recorded drives, {MAIN_DETECTOR}"
+    return [
+        ideas_table(known[Entry(WHOLE)], without),
+        replace(budgets_table(compared), title=title),
+    ]
 
 
 def statements() -> list[Table]:
@@ -120,20 +131,25 @@ def summary_table() -> Table:
         if (results := entries_of(detector))
     }
     parts = ordered[0].parts
-    rows = (
+    rows = [
         (
             one.entry.name,
             format_budget(one.score.budget),
             *(format_budget(one.of_part(part).score.budget) for part in parts),
-            *(format_budget(played[one.entry].score.budget) for played in others.values()),
+            *(_budget_in(played, one.entry) for played in others.values()),
         )
         for one in ordered
-    )
+    ]
     return Table(
         "B90 of every entry, of each part, and of streets under other detectors",
         ("policy", "B90", *parts, *others),
         tuple(rows),
+        tuple(least_notes(rows)),
     )
+
+
+def _budget_in(played: Mapping[Entry, BudgetResult], entry: Entry) -> str:
+    return format_budget(played[entry].score.budget) if entry in played else ""
 
 
 def with_table(page: str) -> str:
@@ -168,8 +184,11 @@ def play(options: Namespace) -> None:
             is_main = detector == MAIN_DETECTOR
             # Other detectors are columns over streets alone.
             played = worlds if is_main else {STREETS: worlds[STREETS]}
-            results = play_budgets(REFERENCE_ENTRIES, player, detector, played)
+            # Bounds count on the recall of the main detector.
+            bounds = BOUNDS if is_main else ()
+            results = play_budgets((*REFERENCE_ENTRIES, *bounds), player, detector, played)
             more = play_budgets(MORE if is_main else (), player, detector, fewer, quick=True)
+            more += play_tuned(worlds[RECORDED], player, options.plays) if is_main else []
             if player.failures:
                 report_problems(by_reason(player.failures, "plays"))
                 raise SystemExit(FAILED)
@@ -178,6 +197,22 @@ def play(options: Namespace) -> None:
                 write_list(TRIAL, more)
             else:
                 write_list(FOLDER / f"{detector}.json", results)
+
+
+def play_tuned(drives: Sequence[RecordedDrive], player: Player, folder: Path) -> list[BudgetResult]:
+    """Play a map per drive that is tuned on all others; return the result of `TUNED` over all
+    drives, none if every play failed. The maps are written to `folder`.
+    """
+    frames = [frames_of(drive.source.film(drive.scene, RAYS)) for drive in drives]
+    results = []
+    for n, drive in enumerate(drives):
+        path = folder / f"without-{drive.scene.name}.npz"
+        data = f"recorded drives without {drive.name}"
+        write_map(path, joined([*frames[:n], *frames[n + 1 :]]), data=data)
+        entry = replace(TUNED, parameters=(("path", str(path)),))
+        results += play_budgets([entry], player, MAIN_DETECTOR, {drive.part: [drive]})
+    rows = tuple(row for result in results for row in result.rows)
+    return [replace(one, entry=TUNED, made_by=made_by(TUNED), rows=rows) for one in results[:1]]
 
 
 def main(words: Sequence[str] | None = None) -> None:
