@@ -9,8 +9,9 @@ tables, figure and the table of `results/b90.md` are made from the results.
 """
 
 import re
+import sys
 from argparse import ArgumentParser, Namespace
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,11 +20,14 @@ import numpy as np
 from care_sim.base.errors import report_problems
 from care_sim.base.files import write_text
 from care_sim.base.interrupts import FAILED
+from care_sim.core.conditions import RAYS
 from care_sim.evaluation.smallest_budget import ENOUGH
 from care_sim.reports.budgets import (
     budget_tables,
+    budgets_table,
     format_budget,
     ideas_table,
+    least_notes,
     parts_table,
     sorted_by_budget,
 )
@@ -40,8 +44,9 @@ from care_sim.study.benchmark.budgets import (
     budget_worlds,
     play_budgets,
 )
-from care_sim.study.benchmark.play import player_in
-from care_sim.study.benchmark.recorded import recorded_drives
+from care_sim.study.benchmark.maker import made_by
+from care_sim.study.benchmark.play import Player, player_in
+from care_sim.study.benchmark.recorded import RECORDED, RecordedDrive, recorded_drives
 from care_sim.study.benchmark.result import (
     publish_references,
     read_list,
@@ -50,6 +55,7 @@ from care_sim.study.benchmark.result import (
 )
 from care_sim.study.benchmark.suite import STREETS, Entry
 from care_sim.study.runner import by_reason
+from care_sim.training.supervised.tuned_place import frames_of, joined, write_map
 
 PAGE = Path(__file__).parents[1] / "results" / "b90.md"
 FOLDER = PAGE.parent / "data" / "b90"
@@ -75,10 +81,13 @@ WITHOUT = {
     "core first": Entry(WHOLE, cell_order="rows-down"),
 }
 """The policy `WHOLE` with one idea removed."""
-MORE = [*BOUNDS, *(entry for entry in WITHOUT.values() if entry not in REFERENCE_ENTRIES)]
+MORE = [entry for entry in WITHOUT.values() if entry not in REFERENCE_ENTRIES]
+TUNED = Entry("tuned-place", label="tuned on the other drives")
+EXAMPLE = Entry("aimed_boxes:AimedBoxes")
+"""A rule of thirty lines, in `docs/examples`."""
 TRIAL = FOLDER / "trial.json"
-"""The results of bounds and of ideas that are no published entries: on the streets of a trial, and
-on all drives.
+"""The results of entries that are not published: of ideas on the streets of a trial and on all
+drives, of `TUNED` on `RECORDED` drives, of `EXAMPLE` on all worlds.
 """
 
 CONVENTIONS = {
@@ -101,15 +110,33 @@ def entries_of(detector: str) -> list[BudgetResult]:
 
 
 def trial() -> list[Table]:
-    """Return the tables of the worlds of `TRIAL`: the entries with the bounds, and what each idea
-    of `WHOLE` is worth.
+    """Return the tables of `TRIAL`: what each idea of `WHOLE` is worth, the map that is tuned on
+    recorded drives beside two entries, and `EXAMPLE` beside its neighbours on streets.
     """
-    played = read_list(TRIAL)
+    *played, tuned, example = read_list(TRIAL)
     published = references(MAIN_DETECTOR, played[0].worlds)
     known = {one.entry: one for one in [*played, *published]}
     without = {idea: known[entry] for idea, entry in WITHOUT.items()}
-    bounded = [known[entry] for entry in (*REFERENCE_ENTRIES, *BOUNDS)]
-    return [parts_table(bounded), ideas_table(known[Entry(WHOLE)], without)]
+    beside = (Entry(WHOLE), Entry(TUNED.policy))
+    compared = [tuned, *(known[entry].of_part(RECORDED) for entry in beside)]
+    title = f"B90 of a map that is tuned on recorded drives, {MAIN_DETECTOR}"
+    neighbours = [one for one in references(MAIN_DETECTOR) if one.entry.policy in DRAWN]
+    return [
+        ideas_table(known[Entry(WHOLE)], without),
+        replace(budgets_table(compared), title=title),
+        *example_tables(example, neighbours),
+    ]
+
+
+def example_tables(example: BudgetResult, neighbours: Sequence[BudgetResult]) -> list[Table]:
+    """Return the tables of `EXAMPLE` beside others, over all worlds and of streets."""
+    name = example.entry.name
+    streets = [one.of_part(STREETS) for one in (example, *neighbours)]
+    pairs = [(name, "care-aimed"), (name, WHOLE)]
+    return [
+        replace(parts_table([example, *neighbours]), title=f"B90 of {name}, {MAIN_DETECTOR}"),
+        statements_table({MAIN_DETECTOR: streets}, pairs),
+    ]
 
 
 def statements() -> list[Table]:
@@ -127,7 +154,8 @@ def conventions() -> Table:
     """Return the table of pairs on streets, if another share than 90% were enough, or if emerging
     newcomers did not count.
     """
-    streets = [one.of_part(STREETS) for one in entries_of(MAIN_DETECTOR)]
+    published = [one for one in entries_of(MAIN_DETECTOR) if one.entry in REFERENCE_ENTRIES]
+    streets = [one.of_part(STREETS) for one in published]
     scored = {
         name: [
             replace(one, rows=tuple(row._replace(full=tuple(row.full * by)) for row in one.rows))
@@ -150,20 +178,25 @@ def summary_table() -> Table:
         if (results := entries_of(detector))
     }
     parts = ordered[0].parts
-    rows = (
+    rows = [
         (
             one.entry.name,
             format_budget(one.score.budget),
             *(format_budget(one.of_part(part).score.budget) for part in parts),
-            *(format_budget(played[one.entry].score.budget) for played in others.values()),
+            *(_budget_in(played, one.entry) for played in others.values()),
         )
         for one in ordered
-    )
+    ]
     return Table(
         "B90 of every entry, of each part, and of streets under other detectors",
         ("policy", "B90", *parts, *others),
         tuple(rows),
+        tuple(least_notes(rows)),
     )
+
+
+def _budget_in(played: Mapping[Entry, BudgetResult], entry: Entry) -> str:
+    return format_budget(played[entry].score.budget) if entry in played else ""
 
 
 def with_table(page: str) -> str:
@@ -192,6 +225,7 @@ def play(options: Namespace) -> None:
     """Play the published entries under the detectors, and write their results. Exits with 1, and
     writes no results of a detector, where one of its plays failed.
     """
+    sys.path.insert(0, str(Path(__file__).parent / "examples"))
     drives = recorded_drives(options.recorded)
     worlds, fewer = (budget_worlds(quick, recorded=drives) for quick in (False, True))
     with player_in(options.plays, options.workers) as player:
@@ -199,8 +233,13 @@ def play(options: Namespace) -> None:
             is_main = detector == MAIN_DETECTOR
             # Other detectors are columns over streets alone.
             played = worlds if is_main else {STREETS: worlds[STREETS]}
-            results = play_budgets(REFERENCE_ENTRIES, player, detector, played)
+            # Bounds count on the recall of the main detector.
+            bounds = BOUNDS if is_main else ()
+            results = play_budgets((*REFERENCE_ENTRIES, *bounds), player, detector, played)
             more = play_budgets(MORE if is_main else (), player, detector, fewer, quick=True)
+            if is_main:
+                more += play_tuned(worlds[RECORDED], player, options.plays)
+                more += play_budgets([EXAMPLE], player, detector, worlds)
             if player.failures:
                 report_problems(by_reason(player.failures, "plays"))
                 raise SystemExit(FAILED)
@@ -209,6 +248,22 @@ def play(options: Namespace) -> None:
                 write_list(TRIAL, more)
             else:
                 write_list(FOLDER / f"{detector}.json", results)
+
+
+def play_tuned(drives: Sequence[RecordedDrive], player: Player, folder: Path) -> list[BudgetResult]:
+    """Play a map per drive that is tuned on all others; return the result of `TUNED` over all
+    drives, none if every play failed. The maps are written to `folder`.
+    """
+    frames = [frames_of(drive.source.film(drive.scene, RAYS)) for drive in drives]
+    results = []
+    for n, drive in enumerate(drives):
+        path = folder / f"without-{drive.scene.name}.npz"
+        data = f"recorded drives without {drive.name}"
+        write_map(path, joined([*frames[:n], *frames[n + 1 :]]), data=data)
+        entry = replace(TUNED, parameters=(("path", str(path)),))
+        results += play_budgets([entry], player, MAIN_DETECTOR, {drive.part: [drive]})
+    rows = tuple(row for result in results for row in result.rows)
+    return [replace(one, entry=TUNED, made_by=made_by(TUNED), rows=rows) for one in results[:1]]
 
 
 def main(words: Sequence[str] | None = None) -> None:

@@ -31,9 +31,11 @@ NOTE = (
 """The note below every table of B90."""
 _INTERVALS = "Intervals are over worlds."
 _NO_INTERVAL = f"Fewer than {LEAST_WORLDS} worlds carry no interval."
-_TIED = "Tied entries share ranks, such as 1-3: the interval of their paired ratio includes 1."
+_TIED = (
+    "Rank 2-7: one entry is better, five are tied with it. Two are tied if the interval of their "
+    "paired ratio includes 1."
+)
 _TIMED = "ms: p50 / p99 of a decision of the policy on streets, on the machine of its file."
-_LEAST = "≤: the smallest budget is enough."
 _TRIAL = "A trial on the streets that --quick plays."
 
 
@@ -49,7 +51,7 @@ def budget_tables(results: Sequence[BudgetResult]) -> list[Table]:
 
 
 def budgets_table(results: Sequence[BudgetResult]) -> Table:
-    """Return a table with a line per result, the smallest B90 first.
+    """Return a table with a line per result, in the order of `sorted_by_budget`.
 
     A line has the rank, what each count alone needs, the ratio to `YARDSTICK` and the time of a
     decision, where results have these. All results must be of the same worlds.
@@ -134,20 +136,31 @@ def _notes(results: Sequence[BudgetResult], is_timed: bool, rows: Sequence[Table
     has_ranks = has_interval(results[0].counts)
     intervals = _INTERVALS if has_ranks else _NO_INTERVAL
     is_trial = STREETS in results[0].parts and any(each.quick for each in results)
-    has_least = any("≤" in entry for row in rows for entry in row)
     notes = {
         f"{NOTE} {intervals}": True,
         _TIED: has_ranks,
         _TIMED: is_timed,
         _TRIAL: is_trial,
-        _LEAST: has_least,
     }
-    return [note for note, is_due in notes.items() if is_due]
+    return [*(note for note, is_due in notes.items() if is_due), *least_notes(rows)]
+
+
+def least_notes(rows: Sequence[TableRow]) -> list[str]:
+    """Return the note that explains ≤, where rows of a table have it."""
+    has_least = any("≤" in entry for row in rows for entry in row)
+    return ["≤: the smallest budget is enough."] if has_least else []
 
 
 def sorted_by_budget(results: Sequence[BudgetResult]) -> list[BudgetResult]:
-    """Sort results by B90, the smallest first; equal ones keep their order."""
-    return sorted(results, key=lambda result: result.score.budget)
+    """Sort results by B90, the smallest first; equal ones keep their order. Results without a rank
+    come last.
+    """
+    return sorted(results, key=lambda result: (not _has_rank(result), result.score.budget))
+
+
+def _has_rank(result: BudgetResult) -> bool:
+    """Return whether a car can have the policy, and spare cells by it."""
+    return not {*result.tags} & {*MARKS} and result.entry.policy != FULL
 
 
 def names_in(results: Sequence[BudgetResult]) -> list[str]:
@@ -165,8 +178,8 @@ def names_in(results: Sequence[BudgetResult]) -> list[str]:
 
 
 def _ranks(ordered: Sequence[BudgetResult]) -> dict[int, str]:
-    """Return the interval of ranks by `id` of every result that a car can have."""
-    ranked = [each for each in ordered if not {*each.tags} & {*MARKS} and each.entry.policy != FULL]
+    """Return the interval of ranks by `id` of every result that has a rank."""
+    ranked = [*filter(_has_rank, ordered)]
     ranks: dict[int, str] = {}
     if not has_interval(ordered[0].counts):
         return ranks

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from care_sim.base.errors import counted
-from care_sim.reports.budgets import format_smallest, sorted_by_budget
+from care_sim.reports.budgets import format_smallest, least_notes, sorted_by_budget
 from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.table import Table
 from care_sim.study.benchmark.budgets import BudgetResult
@@ -17,8 +17,8 @@ _NOTE = (
 
 
 def sources_table(results: Sequence[BudgetResult]) -> Table:
-    """Return a table with a line per result, the smallest B90 first, and a column per source of
-    recorded drives. All results must be of the same worlds, and have recorded ones.
+    """Return a table with a line per result, in the order of `sorted_by_budget`, and a column per
+    source of recorded drives. All results must be of the same worlds, and have recorded ones.
     """
     ordered = sorted_by_budget([_together(one) for one in results])
     rows = [
@@ -33,7 +33,7 @@ def sources_table(results: Sequence[BudgetResult]) -> Table:
         f"B90 on recorded drives by source, {ordered[0].detector}",
         ("policy", "all", *_by_source(ordered[0])),
         tuple(rows),
-        (_NOTE, *told, *tag_notes(one.tags for one in ordered)),
+        (_NOTE, *told, *least_notes(rows), *tag_notes(one.tags for one in ordered)),
         whole=("all",),
     )
 

@@ -5,6 +5,7 @@ import re
 
 import pytest
 
+from care_sim.study.benchmark.bounds import BOUNDS
 from care_sim.study.benchmark.budgets import REFERENCE_ENTRIES
 from care_sim.study.benchmark.maker import made_by
 from care_sim.study.benchmark.suite import Entry
@@ -19,6 +20,8 @@ def test_without_a_file_it_shows_the_published_entries(capsys, here):
     assert (code, err) == (0, "")
     for entry in REFERENCE_ENTRIES:
         assert re.search(rf"^\d\S* +{re.escape(entry.name)} ", out, re.M)
+    *_, last, end = re.findall(r"^ +(bound: .+?) +†", out, re.M)
+    assert [last, end] == [bound.name for bound in BOUNDS]
 
 
 def test_every_set_of_worlds_and_every_detector_has_its_table(capsys, here):

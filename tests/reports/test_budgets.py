@@ -26,8 +26,6 @@ RESULTS = (
 def test_the_smallest_budget_comes_first_with_what_holds_it_back():
     rows = [tuple(map(str, row)) for row in budgets_table(RESULTS).rows]
     assert rows == [
-        # The full scan takes no rank.
-        ("", "full", "≤0.5 [≤0.5, ≤0.5]", "emerging", *["≤0.5"] * 4, "0.20 [0.20, 0.20]"),
         ("1", "care-sector", "2.4 [2.4, 2.4]", "emerging", "2.4", *["≤0.5"] * 3, ""),
         (
             "2",
@@ -41,7 +39,26 @@ def test_the_smallest_budget_comes_first_with_what_holds_it_back():
         # Entries that never get there are tied.
         ("3-4", "boxes", "never [never, never]", "emerging", "never", *["≤0.5"] * 3, "never"),
         ("3-4", "place", "never [never, never]", "kept", *["≤0.5"] * 2, *["never"] * 2, "never"),
+        # The full scan takes no rank.
+        ("", "full", "≤0.5 [≤0.5, ≤0.5]", "emerging", *["≤0.5"] * 4, "0.20 [0.20, 0.20]"),
     ]
+
+
+def test_results_without_a_rank_stand_below_all_others():
+    late, early = (
+        made_budgets(Entry("mine:Bound", label=label), curve, recorded=DRIVES, tags=("privileged",))
+        for label, curve in (("late", HALF_WAY), ("early", ALWAYS))
+    )
+    entries = [made_budgets(name, NEVER, recorded=DRIVES) for name in ("care-sector", "boxes")]
+    results = [late, early, *entries]
+    order = ["care-sector", "boxes", "early (mine:Bound) †", "late (mine:Bound) †"]
+    whole, *each = budget_tables(results)
+    assert [row[:2] for row in whole.rows] == [*zip(["1-2", "1-2", "", ""], order, strict=True)]
+    for table in each:
+        assert [row[1] for row in table.rows] == order
+    assert [row[0] for row in sources_table(results).rows] == order
+    (axes,) = leaderboard_figure(results).axes
+    assert [label.get_text() for label in axes.get_yticklabels()] == order[::-1]
 
 
 def test_entries_whose_paired_ratio_includes_1_share_ranks():
@@ -170,6 +187,7 @@ def test_recorded_drives_by_source():
     # 5 drives have all, and 2 have 20% at 1% and 80% at 2%: 77 and 94% of all.
     assert table.rows[0][1].startswith("1.7 [")
     assert "nuscenes: 2 drives, a full scan has 16 emerging" in " ".join(table.notes)
+    assert "actors were missed" not in table.markdown()
 
 
 def test_a_figure_has_a_row_of_panels_per_part():
@@ -195,7 +213,7 @@ def test_every_count_has_a_panel_and_every_entry_a_curve():
     assert {*line.get_ydata()} == {90.0}
     assert len(curves) == len(RESULTS)
     names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert names == ["full", "care-sector", "care-sector residual=False", "boxes", "place"]
+    assert names == ["care-sector", "care-sector residual=False", "boxes", "place", "full"]
     drawn = dict(zip(names, curves, strict=True))
     assert [*drawn["care-sector"].get_ydata()] == pytest.approx([10, 20, 80, 100, 100, 100, 100])
     assert [*drawn["boxes"].get_xdata()] == pytest.approx([100 * budget for budget in BUDGETS])
@@ -208,12 +226,12 @@ def test_every_count_has_a_panel_and_every_entry_a_curve():
 def test_the_figure_of_the_leaderboard_has_a_line_per_entry_and_never_at_its_end():
     (axes,) = leaderboard_figure(RESULTS).axes
     names = [label.get_text() for label in axes.get_yticklabels()]
-    assert names == ["place", "boxes", "care-sector residual=False", "care-sector", "full"]
+    assert names == ["full", "place", "boxes", "care-sector residual=False", "care-sector"]
     emerging, *_ = (dots.get_offsets() for dots in axes.collections)
-    assert [*emerging[:, 0]] == pytest.approx([0.5, 32.0, 3.87, 2.45, 0.5], abs=0.01)
+    assert [*emerging[:, 0]] == pytest.approx([0.5, 0.5, 32.0, 3.87, 2.45], abs=0.01)
     assert axes.get_xticklabels()[-1].get_text() == "never"
     budgets = axes.lines[0].get_xdata()
-    assert [*budgets] == pytest.approx([32.0, 32.0, 3.87, 2.45, 0.5], abs=0.01)
+    assert [*budgets] == pytest.approx([0.5, 32.0, 32.0, 3.87, 2.45], abs=0.01)
 
 
 def test_few_worlds_rank_nobody():

@@ -97,6 +97,6 @@ def test_a_bound_stands_in_the_table_by_its_label_without_a_rank():
     told = made_budgets(BODIES, ALWAYS, tags=("privileged",))
     table = budgets_table([told, made_budgets("care-sector", HALF_WAY)])
     assert [row[:2] for row in table.rows] == [
-        ("", "bound: all bodies †"),
         ("1", "care-sector"),
+        ("", "bound: all bodies †"),
     ]

@@ -22,8 +22,8 @@ _LINE_INCHES = 0.26
 
 @default_style()
 def leaderboard_figure(results: Sequence[BudgetResult]) -> Figure:
-    """Draw a line per result, the smallest B90 on top: B90 with its interval, and the budget that
-    each part alone needs, or each count of a single part.
+    """Draw a line per result, the first of `sorted_by_budget` on top: B90 with its interval, and
+    the budget that each part alone needs, or each count of a single part.
     """
     # Lines are counted from below.
     upwards = sorted_by_budget(results)[::-1]

@@ -6,7 +6,8 @@ objects kept, people kept. It shows what a fixed pattern without a camera can re
 
 import time
 from collections.abc import Iterable, Iterator
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -55,20 +56,28 @@ def train_tuned_place(config: TunedPlaceConfig) -> int:
     started = time.perf_counter()
     seeds = show_each(range(TRAINING, TRAINING + config.streets), "training street")
     frames = joined(frames_of(street_film(seed)) for seed in seeds)
-    grid = AngularGrid()
-    order, shares = tuned_order(frames, chance_table(), grid.size)
-    card = card_of(
-        "place",
+    shares = write_map(
+        config.out,
+        frames,
         scenario="CARE-Street-v0",
         data=f"{len(frames.sizes)} objects at keyframes, tuned to four counts",
         seeds={"train": [TRAINING, TRAINING + config.streets - 1]},
     )
-    worth = np.zeros(grid.size, np.float32)
-    worth[order] = np.arange(len(order), 0, -1)
-    save_weights(config.out, {"sightings": worth.reshape(grid.shape)}, card)
     reached = {f"{name} at 10%": share for name, share in zip(SCENE_COUNTS, shares, strict=True)}
     print_end(config.out, started, reached, None, "run", str(config.out))
     return 0
+
+
+def write_map(path: Path, frames: Frames, **told: Any) -> Floats:
+    """Write a map tuned to the objects, with what its card says of them. Return the shares (4,) of
+    the grid's first tenth.
+    """
+    grid = AngularGrid()
+    order, shares = tuned_order(frames, chance_table(), grid.size)
+    worth = np.zeros(grid.size, np.float32)
+    worth[order] = np.arange(len(order), 0, -1)
+    save_weights(path, {"sightings": worth.reshape(grid.shape)}, card_of("place", **told))
+    return shares
 
 
 def frames_of(film: Film) -> Frames:
