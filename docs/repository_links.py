@@ -1,4 +1,5 @@
 """An mkdocs hook: links between the files of the repository lead to the same pages on the site.
+Tables of published studies get the name of their study and a link to the page that explains them.
 
 The site begins in `docs/`, where `results` is a link to the folder beside it. A file view follows
 no such link, so pages name each other by their places in the repository.
@@ -21,7 +22,18 @@ def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, **_: An
         return markdown
     repository = Path(config.docs_dir).parent.resolve()
     place = Path(page.file.abs_src_path).resolve().relative_to(repository).as_posix()
+    folder, name = posixpath.split(place)
+    if name == "tables.md":
+        markdown = _titled(markdown, folder)
     return _LINK.sub(lambda link: _on_site(link, place, page.file.src_uri, config), markdown)
+
+
+def _titled(tables: str, folder: str) -> str:
+    up = posixpath.relpath(".", folder)
+    tables = tables.replace("`docs/reading.md`", f"[marks and terms]({up}/docs/reading.md)")
+    return (
+        tables if tables.startswith("# ") else f"# Tables: {posixpath.basename(folder)}\n\n{tables}"
+    )
 
 
 def _on_site(link: re.Match[str], place: str, page: str, config: MkDocsConfig) -> str:

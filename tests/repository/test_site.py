@@ -16,10 +16,16 @@ from tests.helpers.places import ROOT
 pytestmark = pytest.mark.slow
 DESK = {"viewport": {"width": 1280, "height": 900}, "color_scheme": "dark"}
 PHONE = {"width": 390, "height": 844}
+PAPER = {"width": 718, "height": 1046}
+"""A page of A4 without margins of 10 mm."""
 TOO_WIDE = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
 ABOUT = """() => ({
   mute: [...document.images].filter(each => !each.alt || !each.naturalWidth).map(each => each.src),
 })"""
+
+
+WIDEST_TABLE = """Math.max(0, ...Array.from(document.querySelectorAll(".md-content table"),
+  each => each.getBoundingClientRect().right))"""
 
 
 class Quiet(SimpleHTTPRequestHandler):
@@ -100,6 +106,10 @@ def walked(chromium, site, address):
         about[path] = page.evaluate(ABOUT)
         page.set_viewport_size(PHONE)
         about[path]["too wide"] = page.evaluate(TOO_WIDE)
+        page.set_viewport_size(PAPER)
+        page.emulate_media(media="print")
+        about[path]["widest table"] = page.evaluate(WIDEST_TABLE)
+        page.emulate_media(media="screen")
     page.context.close()
     return about, troubles
 
@@ -118,6 +128,26 @@ def test_every_picture_is_there_and_says_what_it_shows(walked):
 def test_no_page_is_wider_than_a_phone(walked):
     about, _ = walked
     assert {path: told["too wide"] for path, told in about.items() if told["too wide"] > 0} == {}
+
+
+def test_paper_holds_every_table(walked):
+    about, _ = walked
+    widest = {path: told["widest table"] for path, told in about.items()}
+    assert max(widest.values()) > 600
+    assert {path: width for path, width in widest.items() if width > PAPER["width"]} == {}
+
+
+def test_numbered_lists_go_on_behind_code(site):
+    assert re.findall(r'<ol start="(\d)">', (site / "competition.html").read_text()) == ["2", "3"]
+
+
+def test_tables_of_data_have_a_title_a_legend_and_whole_cells(site):
+    text = (site / "results/data/crowding/tables.html").read_text()
+    assert "<title>Tables: crowding" in text
+    assert '<a href="../../../reading.html">marks and terms</a>' in text
+    assert "\\~" not in text
+    leaderboard = (site / "results/data/b90/leaderboard.html").read_text()
+    assert re.search(r'<td class="unbroken">7\.\d \[\d\.\d,&nbsp;[\d.]+\]</td>', leaderboard)
 
 
 def test_the_search_finds_a_page(chromium, address):
