@@ -11,7 +11,7 @@ from care_sim.study.benchmark import result as result_files
 from care_sim.study.benchmark.budgets import budget_tasks, budget_worlds, counts_of
 from care_sim.study.benchmark.recorded import AHEAD, RECORDED, recorded_drives
 from care_sim.study.benchmark.result import read_result
-from care_sim.study.benchmark.suite import DRIVES, STREETS, TESTS, Entry
+from care_sim.study.benchmark.suite import DRIVES, STREETS, TESTS, TIGHT_TESTS, Entry
 from tests.helpers import kitti_drive
 from tests.helpers.made_budgets import ALWAYS, HALF_WAY, NEVER, made_budgets
 
@@ -27,6 +27,7 @@ def test_streets_are_test_seeds_and_a_trial_plays_the_first_of_them():
         STREETS: 80,
         DRIVES: 24,
         TESTS: 40,
+        TIGHT_TESTS: 80,
     }
 
 

@@ -13,6 +13,7 @@ from care_sim.study.benchmark.suite import (
     FIRST_SEED,
     STREETS,
     TESTS,
+    TIGHT_TESTS,
     Entry,
     Salt,
     episode_seeds,
@@ -27,7 +28,7 @@ def salt(tmp_path):
     return Salt.read(path)
 
 
-@pytest.mark.parametrize("part", [DRIVES, TESTS])
+@pytest.mark.parametrize("part", [DRIVES, TESTS, TIGHT_TESTS])
 def test_published_drives_and_tests_are_test_seeds_that_nobody_had_looked_at(part):
     seeds = episode_seeds(part)
     assert list(seeds) == sorted(set(seeds))

@@ -37,6 +37,7 @@ from care_sim.study.benchmark.suite import (
     LATE,
     STREETS,
     TESTS,
+    TIGHT_TESTS,
     Entry,
     Salt,
     configurations,
@@ -54,7 +55,7 @@ MAIN_DETECTOR = "centerpoint"
 STREETS_PLAYED, QUICK_STREETS = 80, 24
 """Streets of the score, and those of a trial. With 80 streets the interval of the best policy is a
 fifth of its B90."""
-EPISODES_PLAYED = {DRIVES: 24, TESTS: 40}
+EPISODES_PLAYED = {DRIVES: 24, TESTS: 40, TIGHT_TESTS: 80}
 """Worlds of the closed loop, where they are played too."""
 REFERENCE_ENTRIES = (
     Entry("care-sector"),
@@ -76,7 +77,7 @@ REFERENCE_ENTRIES = (
 """The entries that stand beside everybody's."""
 FILMED = (STREETS, *RECORDED_PARTS)
 """Parts of the open loop."""
-COUNTS = dict.fromkeys(FILMED, SCENE_COUNTS) | dict.fromkeys((DRIVES, TESTS), EPISODE_COUNTS)
+COUNTS = dict.fromkeys(FILMED, SCENE_COUNTS) | dict.fromkeys(EPISODES_PLAYED, EPISODE_COUNTS)
 _DECIMALS = 3
 
 

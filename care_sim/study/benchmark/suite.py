@@ -27,7 +27,7 @@ from care_sim.study.play_config import play_grid
 from care_sim.study.rows.parameters import Parameters
 from care_sim.study.run_config import RunConfig
 
-DRIVES, TESTS, STREETS = "drives", "tests", "streets"
+DRIVES, TESTS, TIGHT_TESTS, STREETS = "drives", "tests", "tight tests", "streets"
 FIRST_SEED = 200
 """First test seed of the benchmark. Seeds below were looked at while the worlds were built (0 to
 137 of the drives). Policies were first tried on some of them (streets 0 to 19, drives 100 to
@@ -45,9 +45,11 @@ BOUNDS_MODULE = "care_sim.study.benchmark.bounds:"
 """The module of the policies that know the truth; the benchmark plays none for anybody."""
 _UNTABLED = "|<>$`"
 """Characters that tables, pages and figures take for more than text."""
+_DRAWN_TEST = ("ncap", (("test", "drawn"), ("speed_kph", 0)))
 _SCENARIOS: dict[str, tuple[str, Parameters]] = {
     DRIVES: ("drive", ()),
-    TESTS: ("ncap", (("test", "drawn"), ("speed_kph", 0))),
+    TESTS: _DRAWN_TEST,
+    TIGHT_TESTS: _DRAWN_TEST,
 }
 
 
@@ -166,9 +168,20 @@ def fresh_seeds(folder: Path, number: int) -> list[int]:
 @cache
 def episode_seeds(part: str) -> tuple[int, ...]:
     """Return the seeds of the drives or tests: the first ones from `FIRST_SEED` on in which a car
-    that detects nothing collides and the full scan does not. No policy was played to choose them.
+    that detects nothing collides and the full scan does not. Tight tests are admitted by
+    `care_sim.study.benchmark.tight`. No policy was played to choose them.
     """
-    return tuple(parsed_json(_EPISODES.read_text(encoding="utf-8"))[part])
+    return tuple(map(int, _listed(part)))
+
+
+def _listed(part: str) -> Any:
+    return parsed_json(_EPISODES.read_text(encoding="utf-8"))[part]
+
+
+@cache
+def tight_reactions() -> dict[int, float]:
+    """Return the brake's reaction of every tight test by seed, in seconds."""
+    return {int(seed): reaction_s for seed, reaction_s in _listed(TIGHT_TESTS).items()}
 
 
 def configurations(
@@ -181,4 +194,10 @@ def configurations(
         scenes = [Scene(street_name(seed), seed) for seed in seeds]
         return play_grid(Streets(), scenes, [policy], [budget], **conditions)
     scenario, parameters = _SCENARIOS[part]
-    return grid([scenario], [policy], [budget], seeds, scenario_parameters=parameters, **conditions)
+    plays = grid(
+        [scenario], [policy], [budget], seeds, scenario_parameters=parameters, **conditions
+    )
+    if part != TIGHT_TESTS:
+        return plays
+    reactions = tight_reactions()
+    return [play.changed(brake_reaction_s=reactions[play.seed]) for play in plays]
