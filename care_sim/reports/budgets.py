@@ -142,7 +142,17 @@ def _notes(results: Sequence[BudgetResult], is_timed: bool, rows: Sequence[Table
         _TIMED: is_timed,
         _TRIAL: is_trial,
     }
-    return [*(note for note, is_due in notes.items() if is_due), *least_notes(rows)]
+    # A detector that finds next to nothing makes any policy look good.
+    full = (reachable(part, results[0].of_part(part)) for part in results[0].parts)
+    return [*(note for note, is_due in notes.items() if is_due), *full, *least_notes(rows)]
+
+
+def reachable(name: str, result: BudgetResult, kind: str = "world") -> str:
+    """Return the note that says what a full scan has in the worlds of a result of one part."""
+    (counts,) = result.counts
+    sums = zip(counts.names, counts.full.sum(axis=0), strict=True)
+    told = ", ".join(f"{value:.0f} {count}" for count, value in sums)
+    return f"{name}: {counted(len(result.rows), kind)}, a full scan has {told}."
 
 
 def least_notes(rows: Sequence[TableRow]) -> list[str]:

@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from care_sim.base.errors import counted
-from care_sim.reports.budgets import format_smallest, least_notes, sorted_by_budget
+from care_sim.reports.budgets import format_smallest, least_notes, reachable, sorted_by_budget
 from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.table import Table
 from care_sim.study.benchmark.budgets import BudgetResult
@@ -28,7 +27,7 @@ def sources_table(results: Sequence[BudgetResult]) -> Table:
         )
         for one in ordered
     ]
-    told = (_reachable(source, own) for source, own in _by_source(ordered[0]).items())
+    told = (reachable(source, own, "drive") for source, own in _by_source(ordered[0]).items())
     return Table(
         f"B90 on recorded drives by source, {ordered[0].detector}",
         ("policy", "all", *_by_source(ordered[0])),
@@ -51,11 +50,3 @@ def _by_source(result: BudgetResult) -> dict[str, BudgetResult]:
         source: replace(result, rows=tuple(row for row in result.rows if of[row] == source))
         for source in dict.fromkeys(of.values())
     }
-
-
-def _reachable(source: str, result: BudgetResult) -> str:
-    """Return what a full scan has on the drives of a source, for a note."""
-    (counts,) = result.counts
-    sums = zip(counts.names, counts.full.sum(axis=0), strict=True)
-    told = ", ".join(f"{value:.0f} {name}" for name, value in sums)
-    return f"{source}: {counted(len(result.rows), 'drive')}, a full scan has {told}."
