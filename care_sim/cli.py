@@ -84,6 +84,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
             _end_with(error, trace=_DEBUG in given or bool(os.environ.get("CARE_SIM_DEBUG")))
         if alone:
             interrupts.end_in_silence()
+            # Finalisers of objects that the interrupt left half made would complain.
+            sys.unraisablehook = lambda _: None
         names = _named([*RENAMED.get(arguments[0], "").split(), *arguments] if arguments else [])
         kept = next((_KEPT[name] for name in names if name in _KEPT), "")
         _complain(f"interrupted{kept}", INTERRUPTED)

@@ -22,8 +22,13 @@ class Interrupts(MetaPathFinder):
             except BaseException as lost:
                 raise ImportError("initialization failed") from lost
 
+class HalfMade:
+    def __del__(self):
+        raise AttributeError("an interrupt left it half made")
+
 sys.meta_path.insert(0, Interrupts())
 sys.argv = {arguments!r}
+half_made = HalfMade()
 from care_sim.cli import main
 main()
 """
