@@ -21,7 +21,9 @@ from care_sim.base.errors import report_problems
 from care_sim.base.files import write_text
 from care_sim.base.interrupts import FAILED
 from care_sim.core.conditions import RAYS
+from care_sim.evaluation.counts import SCENE_COUNTS
 from care_sim.evaluation.smallest_budget import ENOUGH
+from care_sim.evaluation.strata import EMERGING
 from care_sim.reports.budgets import (
     budget_tables,
     budgets_table,
@@ -84,19 +86,16 @@ WITHOUT = {
 MORE = [entry for entry in WITHOUT.values() if entry not in REFERENCE_ENTRIES]
 TUNED = Entry("tuned-place", label="tuned on the other drives")
 EXAMPLE = Entry("aimed_boxes:AimedBoxes")
-"""A rule of thirty lines, in `docs/examples`."""
+"""A short rule, in `docs/examples`."""
 TRIAL = FOLDER / "trial.json"
 """The results of entries that are not published: of ideas on the streets of a trial and on all
 drives, of `TUNED` on `RECORDED` drives, of `EXAMPLE` on all worlds.
 """
 
 CONVENTIONS = {
-    "90%": np.ones(4),
-    "80%": np.full(4, 0.80 / ENOUGH),
-    "85%": np.full(4, 0.85 / ENOUGH),
-    "95%": np.full(4, 0.95 / ENOUGH),
-    "without emerging": np.array([0.0, 1.0, 1.0, 1.0]),
-}
+    f"{share:.0%}": np.full(len(SCENE_COUNTS), share / ENOUGH)
+    for share in (ENOUGH, 0.8, 0.85, 0.95)
+} | {"without emerging": np.array([count != EMERGING for count in SCENE_COUNTS], float)}
 """Other scores on streets: by what each count of the full scan is multiplied. A share of 80% of a
 count is one of 90% of fewer."""
 
@@ -113,18 +112,18 @@ def trial() -> list[Table]:
     """Return the tables of `TRIAL`: what each idea of `WHOLE` is worth, the map that is tuned on
     recorded drives beside two entries, and `EXAMPLE` beside its neighbours on streets.
     """
-    *played, tuned, example = read_list(TRIAL)
-    published = references(MAIN_DETECTOR, played[0].worlds)
-    known = {one.entry: one for one in [*played, *published]}
+    played = {one.entry: one for one in read_list(TRIAL)}
+    published = references(MAIN_DETECTOR, played[MORE[0]].worlds)
+    known = played | {one.entry: one for one in published}
     without = {idea: known[entry] for idea, entry in WITHOUT.items()}
     beside = (Entry(WHOLE), Entry(TUNED.policy))
-    compared = [tuned, *(known[entry].of_part(RECORDED) for entry in beside)]
+    compared = [played[TUNED], *(known[entry].of_part(RECORDED) for entry in beside)]
     title = f"B90 of a map that is tuned on recorded drives, {MAIN_DETECTOR}"
     neighbours = [one for one in references(MAIN_DETECTOR) if one.entry.policy in DRAWN]
     return [
         ideas_table(known[Entry(WHOLE)], without),
         replace(budgets_table(compared), title=title),
-        *example_tables(example, neighbours),
+        *example_tables(played[EXAMPLE], neighbours),
     ]
 
 

@@ -6,7 +6,8 @@ from mkdocs.structure.pages import Page
 
 _BLOCK = r"<pre.*?</pre>"
 _SHORT_CODE = re.compile(_BLOCK + r"|<code>([^<]{1,28})</code>", re.DOTALL)
-_INTERVAL = re.compile(_BLOCK + r"|\[([-+\d.]+|never), ([-+\d.]+|never)\]", re.DOTALL)
+_LEVEL = r"(≤?[-+\d.]+|never)"
+_INTERVAL = re.compile(rf"{_BLOCK}|<code.*?</code>|\[{_LEVEL}, {_LEVEL}\]", re.DOTALL)
 _CELL = re.compile(r"<td>((?:<strong>)?[^<]{1,24}(?:</strong>)?)</td>")
 _HEADING = re.compile(r"<td>(<em>[^<]*</em></td>)((?:\s*<td></td>)+)")
 

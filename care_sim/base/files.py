@@ -72,8 +72,8 @@ def check_output(path: Path, kind: bytes = b"") -> None:
     that holds a file of another `kind`. Raise OSError where writing is not allowed. The folder is
     made.
     """
-    # Check first what exists at the path. Then a file is made beside it and removed again, which
-    # tells at once what the system would not allow at the end.
+    # Check first what exists at the path. Then a file is made beside it and removed again, so that
+    # a missing permission shows now, and not at the end.
     if path.is_dir():
         raise InvalidInput(f"{path} is a folder, a file is wanted")
     # The system's own links, such as /dev/stdout, are not to be replaced.

@@ -78,8 +78,8 @@ def _shorten_socket_folder() -> None:
 
 
 def end_with_parent() -> None:
-    """End this process, which multiprocessing started, as soon as the one that asked for it is
-    gone, however that ended. A fork server's worker waits for the process that asked for it, not
+    """End this process, which multiprocessing started, soon after the process that requested it,
+    however that ended. A fork server's worker waits for the process that asked for it, not
     for the fork server, which ends after its last worker.
     """
     # A thread waits for the parent, and as a daemon it keeps nobody: no signal tells a child that

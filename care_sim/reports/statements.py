@@ -18,7 +18,13 @@ import numpy as np
 
 from care_sim.base.errors import counted
 from care_sim.evaluation.smallest_budget import budget_ratio, has_interval
-from care_sim.reports.budgets import NOTE, format_ratio, format_smallest, sorted_by_budget
+from care_sim.reports.budgets import (
+    NOTE,
+    format_ratio,
+    format_smallest,
+    sorted_by_budget,
+    worlds_of,
+)
 from care_sim.reports.table import Table
 from care_sim.study.benchmark.budgets import BudgetResult
 
@@ -33,8 +39,10 @@ QUESTIONS: tuple[Pair, ...] = (
     ("care-sector", "tuned-place"),
     ("care-sector", "after-ancha"),
     ("care core-spread", "all-camera core-spread"),
+    ("care-sightlines", "learned-sets"),
+    ("tuned-place", "learned-sets"),
 )
-"""Pairs that differ in one idea: the residual, the camera, the paper's rule."""
+"""Pairs that differ in one idea: the residual, the camera, the paper's rule, learning."""
 _NOTE = (
     "Ratios are the first policy's B90 by the second's, paired over the same worlds. Bold ratios "
     "exclude 1. No interval is widened for the number of statements."
@@ -104,8 +112,7 @@ def statements_table(
         )
         rows.append((told.first, told.second, str(told), *ratios))
     return Table(
-        f"Pairs of policies, under {counted(len(alike), kind)}, "
-        f"{counted(len(main[0].rows), 'world')}",
+        f"Pairs of policies, under {counted(len(alike), kind)}, {worlds_of(main[0])}",
         ("policy", "needs fewer cells than", "holds", *alike),
         tuple(rows),
         (_NOTE,),
@@ -123,7 +130,7 @@ def columns_table(columns: Columns) -> Table:
         for name in names
     )
     return Table(
-        f"B90 under each detector, {counted(len(main[0].rows), 'world')}",
+        f"B90 under each detector, {worlds_of(main[0])}",
         ("policy", *alike),
         tuple(rows),
         (NOTE,),

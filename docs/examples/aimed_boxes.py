@@ -1,16 +1,15 @@
-"""A rule of thirty lines, to hold a policy against: rows ahead, then middles of tracks and boxes.
+"""A short rule, to hold a policy against: rows ahead, then the middles of tracks and boxes.
 
-It treats all camera boxes alike, so it has no residual, and it remembers nothing:
+It aims as `care-aimed` does, but treats all camera boxes alike, so it has no residual, and it
+remembers nothing. Its numbers of cells were set by hand before it played:
 
     cd docs/examples
     care-sim benchmark --policy aimed_boxes:AimedBoxes
 """
 
-import math
-
 import care_sim
 from care_sim.core.residual import wedges
-from care_sim.policies.controls.patterns import ENTRY_HEIGHT_M, cells_by_row, entry_cells
+from care_sim.policies.controls.patterns import cells_by_row, entry_cells
 from care_sim.policies.own.care_aimed import FRONT_RAD, SECOND_M, aimed
 from care_sim.policies.own.sight_lines import columns_ahead
 
@@ -23,8 +22,7 @@ class AimedBoxes(care_sim.Policy):
     def __init__(self, rig):
         super().__init__(rig)
         ahead = columns_ahead(rig.grid, FRONT_RAD)
-        below = math.degrees(math.atan((ENTRY_HEIGHT_M - rig.sensor_height_m) / SECOND_M))
-        self.far, self.near = entry_cells(rig)[ahead], entry_cells(rig, below)[ahead]
+        self.far, self.near = entry_cells(rig)[ahead], entry_cells(rig, SECOND_M)[ahead]
         self.rows = cells_by_row(rig)
 
     def demand(self, belief):

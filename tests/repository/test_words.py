@@ -152,20 +152,12 @@ def played():  # Those of one.
     ]
 
 
-def test_no_sentence_is_inverted():
+@pytest.mark.parametrize(("faults", "programs"), [(inverted, PROGRAMS), (module_faults, MODULES)])
+def test_programs_are_in_plain_words(faults, programs):
     found = [
         f"{path.relative_to(ROOT)}:{line}: {fault}"
-        for path in PROGRAMS
-        for line, fault in inverted(path.read_text())
-    ]
-    assert not found, "\n".join(found)
-
-
-def test_code_is_in_plain_words():
-    found = [
-        f"{path.relative_to(ROOT)}:{line}: {fault}"
-        for path in MODULES
-        for line, fault in module_faults(path.read_text())
+        for path in programs
+        for line, fault in faults(path.read_text())
     ]
     assert not found, "\n".join(found)
 

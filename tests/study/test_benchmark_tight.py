@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from care_sim.study.benchmark.budgets import budget_tasks, budget_worlds
 from care_sim.study.benchmark.play import player_in
 from care_sim.study.benchmark.suite import FIRST_SEED, TESTS, TIGHT_TESTS, Entry, tight_reactions
-from care_sim.study.benchmark.tight import (
+from tests.helpers.tight_tests import (
     LATEST_S,
     USUAL_S,
     full_scans,

@@ -100,13 +100,15 @@ class Rows(Pattern):
         super().__init__(rig, cells_by_row(rig, elevation_deg), shots)
 
 
-def entry_elevation_deg(rig: Rig, above_m: float = 0.0) -> float:
-    """Return the elevation of a car's middle at the scored range, seen from the rig's first LiDAR.
-    It is -1.25 degrees from the default LiDAR, 1.84 m above the road. Another LiDAR stands
-    `above_m` higher.
+def entry_elevation_deg(
+    rig: Rig, above_m: float = 0.0, distance_m: float = ENTRY_DISTANCE_M
+) -> float:
+    """Return the elevation of a car's middle at a distance, by default the scored range, seen from
+    the rig's first LiDAR. It is -1.25 degrees from the default LiDAR, 1.84 m above the road.
+    Another LiDAR stands `above_m` higher.
     """
     # Rounded to a hundredth of a degree: results were published for -1.25 degrees, not for -1.2488.
-    rise = (ENTRY_HEIGHT_M - (rig.sensor_height_m + above_m)) / ENTRY_DISTANCE_M
+    rise = (ENTRY_HEIGHT_M - (rig.sensor_height_m + above_m)) / distance_m
     return round(math.degrees(math.atan(rise)), 2)
 
 
@@ -116,29 +118,37 @@ def cells_by_row(rig: Rig, elevation_deg: float | None = None) -> Cells:
     first such row holds the nearest cell of every column, and so on. Several LiDARs take turns cell
     by cell, so that all begin with their nearest rows.
     """
-    parts = [_own_cells_by_row(rig, head, elevation_deg) for head in rig.grid.heads]
+    parts = [
+        _own_cells_by_row(
+            head,
+            entry_elevation_deg(rig, head.place[2]) if elevation_deg is None else elevation_deg,
+        )
+        for head in rig.grid.heads
+    ]
     turns = np.concatenate([np.arange(len(part)) for part in parts])
     cells: Cells = np.concatenate(parts)[np.argsort(turns, kind="stable")]
     return cells
 
 
-def _own_cells_by_row(rig: Rig, head: Head, elevation_deg: float | None) -> Cells:
+def _own_cells_by_row(head: Head, elevation_deg: float) -> Cells:
     """Return the cells of one LiDAR in the order of `cells_by_row`."""
     grid = head.grid
-    wanted = entry_elevation_deg(rig, head.place[2]) if elevation_deg is None else elevation_deg
-    off = np.abs(np.rad2deg(grid.elevations_everywhere) - wanted)
+    off = np.abs(np.rad2deg(grid.elevations_everywhere) - elevation_deg)
     rows = np.broadcast_to(np.argsort(off, axis=0, kind="stable"), grid.shape)
     columns = np.argsort(np.arange(grid.columns) * GOLDEN % 1)
     cells: Cells = (rows[:, columns] * grid.columns + columns).ravel() + head.first
     return cells
 
 
-def entry_cells(rig: Rig, elevation_deg: float | None = None) -> Cells:
-    """Return (lidars * columns,) the cell of every column nearest to an elevation, LiDAR after
-    LiDAR. By default it is the elevation at which objects enter the scored range.
+def entry_cells(rig: Rig, distance_m: float = ENTRY_DISTANCE_M) -> Cells:
+    """Return (lidars * columns,) the cell of every column nearest to a car's middle at a distance,
+    by default where objects enter the scored range, LiDAR after LiDAR.
     """
     columns = rig.grid.columns
-    nearest = [_own_cells_by_row(rig, head, elevation_deg)[:columns] for head in rig.grid.heads]
+    nearest = [
+        _own_cells_by_row(head, entry_elevation_deg(rig, head.place[2], distance_m))[:columns]
+        for head in rig.grid.heads
+    ]
     return np.concatenate([cells[np.argsort(cells % columns)] for cells in nearest])
 
 

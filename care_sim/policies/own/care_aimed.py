@@ -15,7 +15,7 @@ from care_sim.core.residual import explained, ray_starts, wedge_rays, wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Demand, Ego, ImageDetections
 from care_sim.policies.base import Policy
-from care_sim.policies.controls.patterns import ENTRY_HEIGHT_M, cells_by_row, entry_cells
+from care_sim.policies.controls.patterns import cells_by_row, entry_cells
 from care_sim.policies.own.care import CORE_FIRST
 from care_sim.policies.own.sight_lines import columns_ahead
 from care_sim.world.bodies import CATALOGUE
@@ -80,9 +80,8 @@ class CareAimed(Policy):
         self._aims, self._compares = aim, new
         self._rows = cells_by_row(rig)
         self._entries = entry_cells(rig)
-        fall = math.atan((ENTRY_HEIGHT_M - rig.sensor_height_m) / SECOND_M)
         ahead = columns_ahead(rig.grid, FRONT_RAD)
-        rows = self._entries, entry_cells(rig, math.degrees(fall))
+        rows = self._entries, entry_cells(rig, SECOND_M)
         self._front, self._second = ([row[ahead]] if front else [] for row in rows)
         self.reset()
 

@@ -168,8 +168,9 @@ def fresh_seeds(folder: Path, number: int) -> list[int]:
 @cache
 def episode_seeds(part: str) -> tuple[int, ...]:
     """Return the seeds of the drives or tests: the first ones from `FIRST_SEED` on in which a car
-    that detects nothing collides and the full scan does not. Tight tests are admitted by
-    `care_sim.study.benchmark.tight`. No policy was played to choose them.
+    that detects nothing collides and the full scan does not. Tight tests are
+    those in which the full scan only just avoids the collision (`tests/helpers/tight_tests.py`).
+    No policy was played on these seeds to choose them.
     """
     return tuple(map(int, _listed(part)))
 

@@ -68,15 +68,15 @@ def train_tuned_place(config: TunedPlaceConfig) -> int:
     return 0
 
 
-def write_map(path: Path, frames: Frames, **told: Any) -> Floats:
-    """Write a map tuned to the objects, with what its card says of them. Return the shares (4,) of
-    the grid's first tenth.
+def write_map(path: Path, frames: Frames, **card: Any) -> Floats:
+    """Write a map tuned to the objects, with a `card` that describes them. Return the shares (4,)
+    of the grid's first tenth.
     """
     grid = AngularGrid()
     order, shares = tuned_order(frames, chance_table(), grid.size)
     worth = np.zeros(grid.size, np.float32)
     worth[order] = np.arange(len(order), 0, -1)
-    save_weights(path, {"sightings": worth.reshape(grid.shape)}, card_of("place", **told))
+    save_weights(path, {"sightings": worth.reshape(grid.shape)}, card_of("place", **card))
     return shares
 
 

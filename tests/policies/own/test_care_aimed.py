@@ -19,6 +19,7 @@ from care_sim.policies.own.care_aimed import (
     have_counterparts,
     standing_still,
 )
+from tests.helpers.places import EXAMPLES, loaded
 
 
 def rectangle(left, right, top, bottom):
@@ -145,3 +146,18 @@ def test_sets_follow_the_cell_order_of_the_rig(belief_of, car):
 def test_wrong_settings_are_refused(wrong):
     with pytest.raises(InvalidInput, match=next(iter(wrong))):
         CareAimed(Rig(), **wrong)
+
+
+def test_the_example_serves_all_boxes_alike(environment, encounter):
+    policy = loaded(EXAMPLES / "aimed_boxes.py").AimedBoxes(environment.unwrapped.rig)
+    known = 0
+    for observation in encounter:
+        belief = policy.rig.read(observation)
+        layers = policy.demand(belief).layers
+        every = aimed(wedges(belief.detections, policy.rig), policy.rig)
+        assert [cells.tolist() for cells in layers[2]] == [cells[:6].tolist() for cells in every]
+        known += explained(belief.detections, belief.tracks, policy.rig).sum()
+    assert known > 0
+    own = care_sim.make_policy("care-aimed", environment).demand(belief).layers
+    assert np.array_equal(layers[0][0], own[1][0])
+    assert np.array_equal(layers[3][0], own[6][0])

@@ -1,4 +1,5 @@
-"""Tight tests: Euro NCAP tests in which the full scan only just avoids the collision.
+"""Tight tests: Euro NCAP tests in which the full scan only just avoids the collision. `python -m
+tests.helpers.tight_tests` prints the list in `care_sim/study/benchmark/worlds.json`.
 
 In ordinary tests, policies with a camera avoid nearly all collisions at 1% of the cells. In a tight
 test the brake reacts as late as the full scan can afford. A reaction one keyframe longer makes even
@@ -8,12 +9,18 @@ Only the full scan decides, with the main detector. Policies played on seeds 2,0
 before `LATEST_S` was fixed.
 """
 
+import json
 from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import count
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import cast
 
 from care_sim.base.errors import InvalidInput
-from care_sim.study.benchmark.budgets import MAIN_DETECTOR
-from care_sim.study.benchmark.play import Player
-from care_sim.study.benchmark.suite import TESTS, configurations
+from care_sim.study.benchmark.budgets import EPISODES_PLAYED, MAIN_DETECTOR
+from care_sim.study.benchmark.play import Player, player_in
+from care_sim.study.benchmark.suite import FIRST_SEED, TESTS, TIGHT_TESTS, configurations
 from care_sim.study.rows.reading import is_avoided
 from care_sim.study.run_config import FULL, Row
 
@@ -21,6 +28,9 @@ USUAL_S, LATEST_S = 0.3, 2.0
 """The usual reaction of the brake, and the reaction of a slow driver, seconds."""
 _TENTHS = 10
 """Reactions are whole tenths of a second, so that two of them are a keyframe apart."""
+
+_AT_ONCE = 60
+"""Seeds that are tried together."""
 
 Case = tuple[int, float]
 """Seed of a test, and reaction of the brake in seconds."""
@@ -63,4 +73,20 @@ def full_scans(player: Player, cases: Sequence[Case]) -> list[Row]:
     rows = player.rows(configs)
     if player.failures:
         raise InvalidInput(str(player.failures[0]))
-    return [row for row in rows if row is not None]
+    return cast(list[Row], rows)
+
+
+def main() -> None:
+    """Print the first tight tests as JSON: the brake's reaction by seed."""
+    found: dict[int, float] = {}
+    number = EPISODES_PLAYED[TIGHT_TESTS]
+    with TemporaryDirectory() as folder, player_in(Path(folder), 2) as player:
+        for first in count(FIRST_SEED, _AT_ONCE):
+            if len(found) >= number:
+                break
+            found |= tight_reactions_of(range(first, first + _AT_ONCE), partial(full_scans, player))
+    print(json.dumps(dict(list(found.items())[:number])))
+
+
+if __name__ == "__main__":
+    main()
