@@ -55,7 +55,7 @@ from care_sim.study.benchmark.result import (
     references,
     write_list,
 )
-from care_sim.study.benchmark.suite import STREETS, Entry
+from care_sim.study.benchmark.suite import STREETS, TIGHT_TESTS, Entry
 from care_sim.study.runner import by_reason
 from care_sim.training.supervised.tuned_place import frames_of, joined, write_map
 
@@ -87,6 +87,8 @@ MORE = [entry for entry in WITHOUT.values() if entry not in REFERENCE_ENTRIES]
 TUNED = Entry("tuned-place", label="tuned on the other drives")
 EXAMPLE = Entry("aimed_boxes:AimedBoxes")
 """A short rule, in `docs/examples`."""
+TIGHT = FOLDER / "tight.json"
+"""The results of the published entries in tight tests."""
 TRIAL = FOLDER / "trial.json"
 """The results of entries that are not published: of ideas on the streets of a trial and on all
 drives, of `TUNED` on `RECORDED` drives, of `EXAMPLE` on all worlds.
@@ -213,6 +215,7 @@ def written() -> str:
         *budget_tables(main),
         sources_table(main),
         *trial(),
+        budgets_table(read_list(TIGHT)),
         *statements(),
         conventions(),
     ]
@@ -239,12 +242,15 @@ def play(options: Namespace) -> None:
             if is_main:
                 more += play_tuned(worlds[RECORDED], player, options.plays)
                 more += play_budgets([EXAMPLE], player, detector, worlds)
+                seeds = budget_worlds(closed_loop=True)[TIGHT_TESTS]
+                tight = play_budgets(REFERENCE_ENTRIES, player, detector, {TIGHT_TESTS: seeds})
             if player.failures:
                 report_problems(by_reason(player.failures, "plays"))
                 raise SystemExit(FAILED)
             if is_main:
                 publish_references(results)
                 write_list(TRIAL, more)
+                write_list(TIGHT, tight)
             else:
                 write_list(FOLDER / f"{detector}.json", results)
 
