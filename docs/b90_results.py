@@ -63,9 +63,10 @@ PAGE = Path(__file__).parents[1] / "results" / "b90.md"
 FOLDER = PAGE.parent / "data" / "b90"
 DETECTORS = (MAIN_DETECTOR, "megvii", "pointrcnn", "returns")
 """The main one first. The results under each of the others are a file by its name."""
+WHOLE, NEWEST = "care-sector", "care-aimed"
 DRAWN = (
-    "care-aimed",
-    "care-sector",
+    NEWEST,
+    WHOLE,
     "care-sightlines",
     "after-ancha",
     "tuned-place",
@@ -74,16 +75,29 @@ DRAWN = (
 )
 """The policies of the figure, without parameters."""
 COMMAND = "python docs/b90_results.py --recorded nuscenes:DATA argoverse2:DATA kitti:DATA boreas"
-WHOLE = "care-sector"
 WITHOUT = {
-    "residual": Entry(WHOLE, (("residual", False),)),
-    "tracks": Entry(WHOLE, (("tracks", False),)),
-    "explained boxes": Entry(WHOLE, (("explained", False),)),
-    "sector ahead": Entry(WHOLE, (("sector", False),)),
-    "core first": Entry(WHOLE, cell_order="rows-down"),
+    WHOLE: {
+        "residual": Entry(WHOLE, (("residual", False),)),
+        "tracks": Entry(WHOLE, (("tracks", False),)),
+        "explained boxes": Entry(WHOLE, (("explained", False),)),
+        "sector ahead": Entry(WHOLE, (("sector", False),)),
+        "core first": Entry(WHOLE, cell_order="rows-down"),
+    },
+    NEWEST: {
+        "residual": Entry(NEWEST, (("residual", False),)),
+        "tracks": Entry(NEWEST, (("tracks", False),)),
+        "last picture": Entry(NEWEST, (("new", False),)),
+        "rows ahead": Entry(NEWEST, (("front", False),)),
+        "aim": Entry(NEWEST, (("aim", False),)),
+    },
 }
-"""The policy `WHOLE` with one idea removed."""
-MORE = [entry for entry in WITHOUT.values() if entry not in REFERENCE_ENTRIES]
+"""Policies of ours with one idea removed."""
+MORE = [
+    entry
+    for ideas in WITHOUT.values()
+    for entry in ideas.values()
+    if entry not in REFERENCE_ENTRIES
+]
 TUNED = Entry("tuned-place", label="tuned on the other drives")
 EXAMPLE = Entry("aimed_boxes:AimedBoxes")
 """A short rule, in `docs/examples`."""
@@ -111,19 +125,21 @@ def entries_of(detector: str) -> list[BudgetResult]:
 
 
 def trial() -> list[Table]:
-    """Return the tables of `TRIAL`: what each idea of `WHOLE` is worth, the map that is tuned on
-    recorded drives beside two entries, and `EXAMPLE` beside its neighbours on streets.
+    """Return the tables of `TRIAL`: what each idea of two policies is worth, the map that is tuned
+    on recorded drives beside two entries, and `EXAMPLE` beside its neighbours on streets.
     """
     played = {one.entry: one for one in read_list(TRIAL)}
     published = references(MAIN_DETECTOR, played[MORE[0]].worlds)
     known = played | {one.entry: one for one in published}
-    without = {idea: known[entry] for idea, entry in WITHOUT.items()}
     beside = (Entry(WHOLE), Entry(TUNED.policy))
     compared = [played[TUNED], *(known[entry].of_part(RECORDED) for entry in beside)]
     title = f"B90 of a map that is tuned on recorded drives, {MAIN_DETECTOR}"
     neighbours = [one for one in references(MAIN_DETECTOR) if one.entry.policy in DRAWN]
     return [
-        ideas_table(known[Entry(WHOLE)], without),
+        *(
+            ideas_table(known[Entry(policy)], {idea: known[one] for idea, one in ideas.items()})
+            for policy, ideas in WITHOUT.items()
+        ),
         replace(budgets_table(compared), title=title),
         *example_tables(played[EXAMPLE], neighbours),
     ]
@@ -133,7 +149,7 @@ def example_tables(example: BudgetResult, neighbours: Sequence[BudgetResult]) ->
     """Return the tables of `EXAMPLE` beside others, over all worlds and of streets."""
     name = example.entry.name
     streets = [one.of_part(STREETS) for one in (example, *neighbours)]
-    pairs = [(name, "care-aimed"), (name, WHOLE)]
+    pairs = [(name, NEWEST), (name, WHOLE)]
     return [
         replace(parts_table([example, *neighbours]), title=f"B90 of {name}, {MAIN_DETECTOR}"),
         statements_table({MAIN_DETECTOR: streets}, pairs),
@@ -164,7 +180,7 @@ def conventions() -> Table:
         ]
         for name, by in CONVENTIONS.items()
     }
-    pairs = ("care-aimed", WHOLE), ("care-aimed", "care-sightlines"), *QUESTIONS
+    pairs = (NEWEST, WHOLE), (NEWEST, "care-sightlines"), *QUESTIONS
     return statements_table(scored, pairs, "convention")
 
 

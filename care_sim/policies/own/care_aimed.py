@@ -57,8 +57,9 @@ class CareAimed(Policy):
     the first, as wide; the rest of the first row; the pattern `rows`. Each set begins in its
     middle, a little above half its height, unless the rig has a cell order.
 
-    Each idea can be switched off: `aim` (else the core first, spread), `new` (else each unexplained
-    box counts as new), `front` (else the rows come late).
+    Each idea can be switched off, to measure its worth: `residual` (every box counts as
+    unexplained), `tracks` (no hulls), `aim` (else the core first, spread), `new` (each unexplained
+    box counts as new), `front` (the rows come late).
     """
 
     name = "care-aimed"
@@ -69,14 +70,17 @@ class CareAimed(Policy):
         self,
         rig: Rig,
         hull_cells: int = HULL_CELLS,
+        residual: bool = True,
+        tracks: bool = True,
         aim: bool = True,
         new: bool = True,
         front: bool = True,
     ):
         super().__init__(rig)
         check_whole("hull_cells", hull_cells, 1)
-        check_flags(aim=aim, new=new, front=front)
+        check_flags(residual=residual, tracks=tracks, aim=aim, new=new, front=front)
         self._few = hull_cells
+        self._uses_residual, self._follows = residual, tracks
         self._aims, self._compares = aim, new
         self._rows = cells_by_row(rig)
         self._entries = entry_cells(rig)
@@ -100,13 +104,16 @@ class CareAimed(Policy):
     def demand(self, belief: Belief) -> Demand:
         """Layers in order of priority; see the class."""
         detections = belief.detections
-        residual = ~explained(detections, belief.tracks, self.rig)
+        residual = np.ones(len(detections), bool)
+        if self._uses_residual:
+            residual = ~explained(detections, belief.tracks, self.rig)
         new = residual.copy()
         if self._compares:
             new &= ~have_counterparts(self._picture(belief), self._before)
         fresh = self._listed(wedges(detections.take(new), self.rig), NEW_MOST)
         older = self._listed(wedges(detections.take(residual & ~new), self.rig), OLD_CELLS)
-        hulls = self._listed(self.rig.hulls(belief.tracks.boxes), self._few + MORE_CELLS)
+        tracked = belief.tracks.boxes[: None if self._follows else 0]
+        hulls = self._listed(self.rig.hulls(tracked), self._few + MORE_CELLS)
         return Demand(
             layers=[
                 fresh.part(0, NEW_CELLS),
