@@ -62,7 +62,7 @@ from care_sim.training.supervised.tuned_place import frames_of, joined, write_ma
 PAGE = Path(__file__).parents[1] / "results" / "b90.md"
 FOLDER = PAGE.parent / "data" / "b90"
 DETECTORS = (MAIN_DETECTOR, "megvii", "pointrcnn", "returns")
-"""The main one first. The results under each of the others are a file by its name."""
+"""The main one first."""
 WHOLE, NEWEST = "care-sector", "care-aimed"
 DRAWN = (
     NEWEST,
@@ -116,14 +116,6 @@ CONVENTIONS = {
 count is one of 90% of fewer."""
 
 
-def entries_of(detector: str) -> list[BudgetResult]:
-    """Return the published entries under a detector, in their order; none before it has played."""
-    if detector == MAIN_DETECTOR:
-        return references(detector)
-    path = FOLDER / f"{detector}.json"
-    return read_list(path) if path.exists() else []
-
-
 def trial() -> list[Table]:
     """Return the tables of `TRIAL`: what each idea of two policies is worth, the map that is tuned
     on recorded drives beside two entries, and `EXAMPLE` beside its neighbours on streets.
@@ -158,7 +150,7 @@ def example_tables(example: BudgetResult, neighbours: Sequence[BudgetResult]) ->
 
 def statements() -> list[Table]:
     """Return the tables over all detectors that have played, on streets; none for the main one."""
-    columns = {detector: entries_of(detector) for detector in DETECTORS}
+    columns = {detector: references(detector) for detector in DETECTORS}
     streets = {
         detector: [one.of_part(STREETS) for one in results]
         for detector, results in columns.items()
@@ -171,7 +163,7 @@ def conventions() -> Table:
     """Return the table of pairs on streets, if another share than 90% were enough, or if emerging
     newcomers did not count.
     """
-    published = [one for one in entries_of(MAIN_DETECTOR) if one.entry in REFERENCE_ENTRIES]
+    published = [one for one in references(MAIN_DETECTOR) if one.entry in REFERENCE_ENTRIES]
     streets = [one.of_part(STREETS) for one in published]
     scored = {
         name: [
@@ -180,7 +172,7 @@ def conventions() -> Table:
         ]
         for name, by in CONVENTIONS.items()
     }
-    pairs = (NEWEST, WHOLE), (NEWEST, "care-sightlines"), *QUESTIONS
+    pairs = (NEWEST, "care-sightlines"), *QUESTIONS
     return statements_table(scored, pairs, "convention")
 
 
@@ -188,11 +180,11 @@ def summary_table() -> Table:
     """Return the table of `results/b90.md`: a line per entry with its B90, that of each part, and
     that of the streets under each other detector that has played.
     """
-    ordered = sorted_by_budget(entries_of(MAIN_DETECTOR))
+    ordered = sorted_by_budget(references(MAIN_DETECTOR))
     others = {
         detector: {one.entry: one for one in results}
         for detector in DETECTORS[1:]
-        if (results := entries_of(detector))
+        if (results := references(detector))
     }
     parts = ordered[0].parts
     rows = [
@@ -225,7 +217,7 @@ def with_table(page: str) -> str:
 
 def written() -> str:
     """Return the text of `tables.md` as the results are now."""
-    main = entries_of(MAIN_DETECTOR)
+    main = references(MAIN_DETECTOR)
     tables = [
         summary_table(),
         *budget_tables(main),
@@ -263,12 +255,10 @@ def play(options: Namespace) -> None:
             if player.failures:
                 report_problems(by_reason(player.failures, "plays"))
                 raise SystemExit(FAILED)
+            publish_references(results)
             if is_main:
-                publish_references(results)
                 write_list(TRIAL, more)
                 write_list(TIGHT, tight)
-            else:
-                write_list(FOLDER / f"{detector}.json", results)
 
 
 def play_tuned(drives: Sequence[RecordedDrive], player: Player, folder: Path) -> list[BudgetResult]:
@@ -300,7 +290,7 @@ def main(words: Sequence[str] | None = None) -> None:
         parser.error("give --recorded the recorded drives of the published entries, or --tables")
     if not options.tables:
         play(options)
-    drawn = [one for one in entries_of(MAIN_DETECTOR) if one.entry.policy in DRAWN]
+    drawn = [one for one in references(MAIN_DETECTOR) if one.entry.policy in DRAWN]
     save(budgets_figure(drawn), FOLDER / BUDGETS_FIGURE)
     write_text(FOLDER / "tables.md", written())
     write_text(PAGE, with_table(PAGE.read_text(encoding="utf-8")))

@@ -18,7 +18,7 @@ versions, a hash of the code, the machine. `care-sim report FOLDER` makes tables
 [Columns](../../docs/rows.md).
 
 `b90` holds the tables of the [benchmark](../b90.md) (`python docs/b90_results.py`). Its entries are
-in `care_sim/study/benchmark/references.json`. `judge-streets` and `judge-logs` hold results of
+in `care_sim/study/benchmark/references`. `judge-streets` and `judge-logs` hold results of
 `care-sim judge` on [detectors](../detectors.md). `make bench` and `make parity` write `bench.json`
 and `parity.json`.
 

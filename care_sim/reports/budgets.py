@@ -233,9 +233,14 @@ def format_ratio(ours: BudgetResult, theirs: BudgetResult) -> str:
     if all(isinf(one.score.budget) for one in (ours, theirs)):
         return "both never"
     mean, low, high = budget_ratio(ours.counts, theirs.counts)
-    if (isinf(mean) and isinf(low)) or not has_interval(ours.counts):
-        return "never" if isinf(mean) else f"{mean:.2f}"
-    if isinf(mean):
-        return f"never [{low:.2f}, never]"
-    text = f"{mean:.2f} [{low:.2f}, {'never' if isinf(high) else f'{high:.2f}'}]"
+    text = "other never" if isinf(theirs.score.budget) else _ratio_text(mean)
+    if not has_interval(ours.counts):
+        return text
+    # An interval from "never" to "never" says no more.
+    if not isinf(low) and high > 0:
+        text = f"{text} [{_ratio_text(low)}, {_ratio_text(high)}]"
     return Bold(text) if low > 1 or high < 1 else text
+
+
+def _ratio_text(ratio: float) -> str:
+    return "never" if isinf(ratio) else f"{ratio:.2f}"

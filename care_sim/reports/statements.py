@@ -35,6 +35,7 @@ once, and all entries in the same worlds."""
 Pair = tuple[str, str]
 """The names of two entries."""
 QUESTIONS: tuple[Pair, ...] = (
+    ("care-aimed", "care-sector"),
     ("care-sector", "care-sector residual=False"),
     ("care-sector", "tuned-place"),
     ("care-sector", "after-ancha"),

@@ -19,5 +19,5 @@ def one_street(monkeypatch, tmp_path):
     """One street, with one published entry; a trial is the whole."""
     for name in ("QUICK_STREETS", "STREETS_PLAYED"):
         monkeypatch.setattr(budgets, name, 1)
-    monkeypatch.setattr(result, "_REFERENCES", tmp_path / "published" / "references.json")
+    monkeypatch.setattr(result, "_REFERENCES", tmp_path / "published")
     publish_references([made_budgets(REFERENCE_ENTRIES[0], HALF_WAY, streets=1)])

@@ -105,7 +105,7 @@ def test_drives_and_tests_count_collisions_and_needless_stops(
 
 
 def test_recorded_drives_are_a_part_of_their_own(capsys, here, monkeypatch, tmp_path):
-    monkeypatch.setattr(result_files, "_REFERENCES", tmp_path / "references.json")
+    monkeypatch.setattr(result_files, "_REFERENCES", tmp_path / "references")
     drives = ["kitti/0000", "kitti/0004"]
     published = made_budgets("care-sector", HALF_WAY, recorded=drives)
     result_files.publish_references([published])

@@ -5,7 +5,13 @@ from dataclasses import replace
 import pytest
 
 from care_sim.evaluation.smallest_budget import BUDGETS
-from care_sim.reports.budgets import budget_tables, budgets_table, format_budget, ideas_table
+from care_sim.reports.budgets import (
+    budget_tables,
+    budgets_table,
+    format_budget,
+    format_ratio,
+    ideas_table,
+)
 from care_sim.reports.figures.budgets import budgets_figure
 from care_sim.reports.figures.leaderboard import leaderboard_figure
 from care_sim.reports.recorded import sources_table
@@ -38,9 +44,17 @@ def test_the_smallest_budget_comes_first_with_what_holds_it_back():
         ),
         # Entries that never get there are tied.
         ("3-4", "boxes", "never [never, never]", "emerging", "never", *["≤0.5"] * 3, "never"),
-        ("3-4", "place", "never [never, never]", "kept", *["≤0.5"] * 2, *["never"] * 2, "never"),
+        (
+            "3-4",
+            "place",
+            "never [never, never]",
+            "kept, and 1 more",
+            *["≤0.5"] * 2,
+            *["never"] * 2,
+            "never",
+        ),
         # The full scan takes no rank.
-        ("", "full", "≤0.5 [≤0.5, ≤0.5]", "emerging", *["≤0.5"] * 4, "0.20 [0.20, 0.20]"),
+        ("", "full", "≤0.5 [≤0.5, ≤0.5]", "", *["≤0.5"] * 4, "0.20 [0.20, 0.20]"),
     ]
 
 
@@ -116,18 +130,18 @@ def test_parts_stand_side_by_side_and_the_worse_one_is_the_score():
     whole, streets, drives = budget_tables(results)
     assert whole.columns[3:] == ("held back by", "streets", "recorded", "times care-sector")
     assert [tuple(map(str, row[1:6])) for row in whole.rows] == [
-        ("care-sector", "2.4 [2.4, 2.4]", "streets: emerging", *["2.4 [2.4, 2.4]"] * 2),
+        ("care-sector", "2.4 [2.4, 2.4]", "streets: emerging, and 7 more", *["2.4 [2.4, 2.4]"] * 2),
         (
             "tuned-place",
             "never [never, never]",
-            "recorded: emerging",
+            "recorded: emerging, and 3 more",
             "≤0.5 [≤0.5, ≤0.5]",
             "never [never, never]",
         ),
         (
             "boxes",
             "never [never, never]",
-            "streets: emerging",
+            "streets: emerging, and 3 more",
             "never [never, never]",
             "≤0.5 [≤0.5, ≤0.5]",
         ),
@@ -161,9 +175,9 @@ def test_the_idea_that_is_worth_most_comes_first():
     table = ideas_table(whole, {"rows": nothing, "camera": never, "residual": later})
     assert table.columns[3:] == ("times care-sector", "streets", "recorded")
     assert [(row[0], *row[2:]) for row in table.rows] == [
-        ("without camera", "recorded: emerging", "never", "1.00 [1.00, 1.00]", "never"),
-        ("without residual", "streets: emerging", *["1.58 [1.58, 1.58]"] * 3),
-        ("without rows", "streets: emerging", *["1.00 [1.00, 1.00]"] * 3),
+        ("without camera", "recorded: emerging, and 3 more", "never", "1.00 [1.00, 1.00]", "never"),
+        ("without residual", "streets: emerging, and 7 more", *["1.58 [1.58, 1.58]"] * 3),
+        ("without rows", "streets: emerging, and 7 more", *["1.00 [1.00, 1.00]"] * 3),
     ]
 
 
@@ -249,3 +263,17 @@ def test_ratios_are_to_the_published_entry_of_the_name():
     own, published = made_budgets("care-sector", NEVER), made_budgets("care-sector", HALF_WAY)
     table = budgets_table([own, published])
     assert [row[-1] for row in table.rows] == ["", "never"]
+
+
+def test_a_ratio_says_which_of_the_two_never_gets_there():
+    found, never = made_budgets("care", HALF_WAY), made_budgets("boxes", NEVER)
+    for text, told in (
+        (format_ratio(found, never), "other never"),
+        (format_ratio(never, found), "never"),
+    ):
+        assert (text, type(text)) == (told, Bold)
+    assert format_ratio(never, never) == "both never"
+    # In some draws of worlds, the second policy gets there.
+    rows = (*found.rows[:60], *never.rows[60:])
+    text = format_ratio(found, replace(never, rows=rows))
+    assert text.startswith("other never [0.00, 0.8")

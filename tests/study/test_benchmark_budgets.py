@@ -1,6 +1,7 @@
 """B90 of entries: which worlds are played at which budgets."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -78,7 +79,7 @@ def test_drives_of_one_name_are_refused(tmp_path):
 
 
 def test_a_file_holds_streets_and_drives(tmp_path, monkeypatch):
-    monkeypatch.setattr(result_files, "_REFERENCES", tmp_path / "references.json")
+    monkeypatch.setattr(result_files, "_REFERENCES", tmp_path / "references")
     result = made_budgets("care", HALF_WAY, recorded=["kitti/0000", "boreas/b"], later=NEVER)
     wider = made_budgets("care", HALF_WAY, recorded=["kitti/0000", "kitti/0001"])
     result.write(tmp_path / "mine.json")
@@ -86,12 +87,16 @@ def test_a_file_holds_streets_and_drives(tmp_path, monkeypatch):
     result_files.publish_references([wider])
     with pytest.raises(InvalidInput, match="lacks the recorded drive kitti/0001"):
         read_result(tmp_path / "mine.json")
+    # They are the same under every detector.
+    replace(result, detector="megvii").write(tmp_path / "other.json")
+    with pytest.raises(InvalidInput, match="lacks the recorded drive kitti/0001"):
+        read_result(tmp_path / "other.json")
     result_files.publish_references([result])
     assert read_result(tmp_path / "mine.json") == result
     content = json.loads((tmp_path / "mine.json").read_text())
     assert [*content["counts"]] == ["streets", "recorded ahead", "recorded"]
     assert content["b90_percent"][0] == "never"
-    assert content["held_back_by"] == "recorded ahead: emerging"
+    assert content["held_back_by"] == "recorded ahead: emerging, and 7 more"
     assert result.of_part(STREETS).score.budget < 0.03
     assert result.of_part(AHEAD).worlds == ((AHEAD, "kitti/0000"),)
 
@@ -103,7 +108,8 @@ def test_what_holds_an_entry_back_names_the_part_where_there_are_several():
     assert one.held_back_by == "kept"
     assert made_budgets("care", *curves, recorded=drives).held_back_by == "streets: kept"
     late = made_budgets("care", *curves, recorded=drives, later=NEVER)
-    assert late.held_back_by == "recorded: emerging"
+    assert late.held_back_by == "recorded: emerging, and 3 more"
+    assert made_budgets("care", *[ALWAYS] * 4).held_back_by == ""
 
 
 def test_entries_share_the_full_scan():

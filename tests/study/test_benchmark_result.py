@@ -12,7 +12,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.defaults import CELL_ORDERS
 from care_sim.policies import tags_of
 from care_sim.study.benchmark import result as module
-from care_sim.study.benchmark.budgets import BudgetRow, budget_worlds
+from care_sim.study.benchmark.budgets import COUNTS, BudgetRow, budget_worlds
 from care_sim.study.benchmark.maker import elsewhere, made_by, own_code_of
 from care_sim.study.benchmark.result import (
     publish_references,
@@ -99,6 +99,13 @@ FULL, GOT = [1.0] * 4, [[1.0] * 4] * 7
         ({"counts": {STREETS: ["kept"]}}, "is damaged: its counts of 'streets' must be"),
         ({"rows": [[STREETS, 200, FULL, GOT]] * 2}, "holds a world of the streets twice"),
         ({"rows": [[STREETS, 201, FULL, GOT]]}, "holds other streets than the 80 worlds of"),
+        (
+            {
+                "rows": [["recorded", "kitti/0000", FULL, GOT]],
+                "counts": {"recorded": list(COUNTS[STREETS])},
+            },
+            "is damaged: the drive 'kitti/0000' is of the part recorded ahead, not of recorded",
+        ),
         ({"quick": True}, "holds other streets than the 24 worlds of"),
         ({"sealed": "5" * 64}, "holds other streets"),
         ({"tags": ["best"]}, "has unknown tags ['best']"),
@@ -150,7 +157,7 @@ def test_a_result_names_the_code_and_the_files_that_made_it(tmp_path):
 
 
 def test_published_entries_stand_beside_results_of_the_same_worlds(tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "_REFERENCES", tmp_path / "references.json")
+    monkeypatch.setattr(module, "_REFERENCES", tmp_path / "references")
     wide, other = made_budgets("care", HALF_WAY), made_budgets("place", ALWAYS, detector="returns")
     publish_references([wide, other])
     worlds = [(STREETS, seed) for seed in budget_worlds(quick=True)[STREETS]]
@@ -167,8 +174,7 @@ def test_published_entries_stand_beside_results_of_the_same_worlds(tmp_path, mon
 
 def test_published_entries_are_parsed_once(tmp_path, monkeypatch):
     """Every file that the leaderboard reads is compared with them."""
-    path = tmp_path / "references.json"
-    monkeypatch.setattr(module, "_REFERENCES", path)
+    monkeypatch.setattr(module, "_REFERENCES", tmp_path / "references")
     publish_references([made_budgets("care", HALF_WAY), made_budgets("place", ALWAYS)])
     parsed = []
     kept = module.result_of

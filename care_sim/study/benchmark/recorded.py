@@ -39,7 +39,7 @@ class RecordedDrive(NamedTuple):
     @property
     def part(self) -> str:
         """Return the part of the drive."""
-        return AHEAD if self.source.kind in LABELLED_AHEAD else RECORDED
+        return part_of(self.source.kind)
 
     @property
     def name(self) -> str:
@@ -70,6 +70,11 @@ def drive_plays(
         for drive in drives
         for play in play_grid(drive.source, [drive.scene], [policy], [budget], **conditions)
     ]
+
+
+def part_of(source: str) -> str:
+    """Return the part of the drives of a source."""
+    return AHEAD if source in LABELLED_AHEAD else RECORDED
 
 
 def source_of_world(world: int | str) -> str:

@@ -21,15 +21,17 @@ from care_sim.study.benchmark.budgets import (
     BUDGET_MARK,
     BUDGET_VERSION,
     COUNTS,
+    MAIN_DETECTOR,
     BudgetResult,
     BudgetRow,
     budget_worlds,
 )
-from care_sim.study.benchmark.recorded import RECORDED_PARTS, source_of_world
+from care_sim.study.benchmark.recorded import RECORDED_PARTS, part_of, source_of_world
 from care_sim.study.benchmark.suite import STREETS, Entry
 from care_sim.study.rows.parquet import with_tuples
 
-_REFERENCES = Path(__file__).with_name("references.json")
+_REFERENCES = Path(__file__).with_name("references")
+"""The folder of the published entries, with a file per detector."""
 _MOST_BYTES = 2**24
 
 
@@ -126,6 +128,8 @@ def _parsed(content: Mapping[str, Any]) -> BudgetResult:
 def _row(part: Any, world: Any, full: Any, got: Any) -> BudgetRow:
     if type(world) is not (str if part in RECORDED_PARTS else int):
         raise ValueError("a row must name its part, and its world by a seed or a drive")
+    if part in RECORDED_PARTS and part != (due := part_of(source_of_world(world))):
+        raise ValueError(f"the drive {shown(world)} is of the part {due}, not of {part}")
     return BudgetRow(part, world, tuple(full), tuple(map(tuple, got)))
 
 
@@ -173,8 +177,10 @@ def _check_worlds(result: BudgetResult) -> None:
 
 
 def _check_published(result: BudgetResult) -> None:
-    """Raise InvalidInput for a choice among the drives of a published source."""
-    known = references(result.detector)
+    """Raise InvalidInput for a choice among the drives of a published source, whatever the
+    detector.
+    """
+    known = references(MAIN_DETECTOR)
     published = known[0].worlds if known else ()
     sources = {source_of_world(world) for part, world in result.worlds if part in RECORDED_PARTS}
     due = {
@@ -198,7 +204,9 @@ def references(
     """Return the published entries under a detector in these worlds, or in all that they played;
     none without such plays.
     """
-    results = [result for result in read_list(_REFERENCES) if result.detector == detector]
+    # A result file may name any text as its detector, a path too.
+    published = {path.stem: path for path in _REFERENCES.glob("*.json")}
+    results = read_list(published[detector]) if detector in published else []
     if worlds is None:
         return results
     cut = (result.cut_to(worlds) for result in results)
@@ -215,8 +223,10 @@ def with_references(results: Sequence[BudgetResult]) -> list[BudgetResult]:
 
 
 def publish_references(results: Sequence[BudgetResult]) -> None:
-    """For maintainers: make these the published entries."""
-    write_list(_REFERENCES, results)
+    """For maintainers: make these the published entries under their detectors."""
+    for detector in dict.fromkeys(result.detector for result in results):
+        own = [result for result in results if result.detector == detector]
+        write_list(_REFERENCES / f"{detector}.json", own)
 
 
 def read_list(path: Path) -> list[BudgetResult]:
@@ -231,6 +241,6 @@ def write_list(path: Path, results: Sequence[BudgetResult]) -> None:
 
 
 # By the text, since every file that the leaderboard reads is compared with the published entries.
-@lru_cache(maxsize=1)
+@lru_cache(maxsize=4)
 def _parsed_list(text: str, origin: str) -> tuple[BudgetResult, ...]:
     return tuple(result_of(content, origin) for content in parsed_json(text))
