@@ -5,6 +5,7 @@ question, which begins with the answer.
 import re
 import shlex
 from collections import Counter
+from itertools import combinations
 
 import pytest
 
@@ -15,13 +16,14 @@ from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, ratio_level
 from care_sim.evaluation.smallest_budget import budget_ratio
 from care_sim.policies import BUILT_IN
 from care_sim.reports.budgets import format_budget
-from care_sim.reports.statements import TURNS_OVER
+from care_sim.reports.statements import TIED, TURNS_OVER, statement
 from care_sim.study.benchmark.bounds import BOUNDS
 from care_sim.study.benchmark.budgets import (
     MAIN_DETECTOR,
     REFERENCE_ENTRIES,
     budget_worlds,
 )
+from care_sim.study.benchmark.result import references
 from care_sim.study.benchmark.suite import STREETS, Entry
 from care_sim.study.results_formats import EPISODES
 from care_sim.study.rows.parquet import read_rows
@@ -91,18 +93,25 @@ def test_the_index_and_the_site_lead_to_every_page(page):
 def test_the_first_page_names_scores_as_they_are(page):
     text = " ".join((ROOT / page).read_text().split())
     told = dict(re.findall(r"`([\w-]+)` \(([\d.]+%|never)\)", text))
-    script = loaded(ROOT / "docs" / "b90_results.py")
     scores = {
         one.entry.name: f"{format_budget(one.score.budget)}%".replace("never%", "never")
-        for one in script.entries_of(MAIN_DETECTOR)
+        for one in references(MAIN_DETECTOR)
     }
     assert len(told) >= 5
     assert told.items() <= scores.items()
+    # "A, B and C tie. The paper's D needs more than A."
+    claim = text.partition("**Our rules ")[2].partition(" needs more than ")
+    *tied, more = re.findall(r"`([\w-]+)`", claim[0])
+    fewer = re.findall(r"`([\w-]+)`", claim[2])[0]
+    columns = {MAIN_DETECTOR: references(MAIN_DETECTOR)}
+    assert len(tied) == 3
+    assert {statement(columns, *pair).verdict for pair in combinations(tied, 2)} == {TIED}
+    assert statement(columns, fewer, more).fewer == (MAIN_DETECTOR,)
 
 
 def test_the_table_of_b90_is_that_of_the_published_entries():
     script = loaded(ROOT / "docs" / "b90_results.py")
-    ordered = script.entries_of(MAIN_DETECTOR)
+    ordered = references(MAIN_DETECTOR)
     results = {one.entry: one.of_part(STREETS) for one in ordered}
     assert [*results] == [*REFERENCE_ENTRIES, *BOUNDS]
     streets = tuple((STREETS, seed) for seed in budget_worlds()[STREETS])
