@@ -33,7 +33,7 @@ _AROUND = np.array([0.0, 0.0, 0.0, 1.8, 1.8, 0.0, 0.0])
 _RING_COLOUR = (52, 56, 63)
 KERB_COLOUR = (138, 130, 110)
 RETURN_COLOUR = (172, 176, 184)
-DETECTED_COLOUR, MISSED_COLOUR = palette.FAINT_INK, (104, 109, 118)
+DETECTED_COLOUR, MISSED_COLOUR = palette.FAINT_INK, (118, 123, 132)
 """Colours of objects that are no newcomers."""
 TRACK_COLOUR = (205, 160, 255)
 _AHEAD_S = 1.0
