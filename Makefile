@@ -12,7 +12,7 @@
 # make publish DATA=FOLDER   play published studies again and replace their rows, the cheapest first; it resumes.
 #                 FOLDER holds recordings; ARGS="order ablate" plays these two, ARGS=--list prints order and costs
 # make test-speed   hold the ratios of speed to the published ones; nothing else may run meanwhile
-# make docs       build the documentation's site into build/site
+# make docs       build the documentation's site into build/site; REPOSITORY_URL=URL adds a link to the repository
 # make check      format, lint, types, plain words, tests
 # make torture    random input for ten minutes: commands, calls, files, kills, full disks; SECONDS=600 SEED=0
 #                 CAMPAIGNS="commands files" CASES=1000 unless all; CASE=NAME plays one case alone

@@ -290,7 +290,8 @@ def main(words: Sequence[str] | None = None) -> None:
         parser.error("give --recorded the recorded drives of the published entries, or --tables")
     if not options.tables:
         play(options)
-    drawn = [one for one in references(MAIN_DETECTOR) if one.entry.policy in DRAWN]
+    plain = [*map(Entry, DRAWN)]
+    drawn = [one for one in references(MAIN_DETECTOR) if one.entry in plain]
     save(budgets_figure(drawn), FOLDER / BUDGETS_FIGURE)
     write_text(FOLDER / "tables.md", written())
     write_text(PAGE, with_table(PAGE.read_text(encoding="utf-8")))

@@ -129,12 +129,11 @@ def _tell(
     """
     scenes = {name: [*own.values()] for name, own in judged.items()}
     first = next(iter(judged.values()))
-    boxes = {name: [one.boxes for one in own] for name, own in scenes.items()}
     tables = detector_tables(scenes, options.least_scores, options.against)
     told = _report(options, [*first], scenes, plays)
     write_text(options.out / _FIGURES, json.dumps(told, indent=1) + "\n")
     write_text(options.out / _TABLES, "\n".join(table.markdown() for table in tables))
-    save(detectors_figure(boxes), options.out / DETECTORS_FIGURE)
+    save(detectors_figure(told["detectors"]), options.out / DETECTORS_FIGURE)
     # Samples of another run beside these would be scored as if they were of these scenes.
     official = options.out / _OFFICIAL
     for old in official.glob("*.json"):

@@ -7,6 +7,7 @@ recorded clouds. Nothing in it depends on a policy. It holds truth; policies see
 
 from dataclasses import dataclass, field
 
+from care_sim.core.arrays import Floats
 from care_sim.core.cells.stack import Grid
 from care_sim.core.conditions import RAYS, FilmedReturns
 from care_sim.core.frames import Frame
@@ -56,7 +57,8 @@ class Film:
     `hidden` are the objects that its source annotates at the first keyframe though no return and no
     pixel shows them there. No shot annotates them, so nobody has to find them; they were present
     all the same. `detected` says that a detector made what the cameras have seen: it errs by
-    itself.
+    itself. `kerbs` are the road's edges for pictures, lines (n, 2) in the world, where its source
+    knows the road.
     """
 
     name: str
@@ -69,6 +71,7 @@ class Film:
     place: tuple[float, float] = LIDAR_POSITION[:2]
     detected: bool = False
     returns: FilmedReturns = RAYS
+    kerbs: tuple[Floats, ...] = ()
 
     @property
     def position(self) -> Place:

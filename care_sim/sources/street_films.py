@@ -77,7 +77,7 @@ def record(street: Street, setup: SensorSetup = _DEFAULT, returns: FilmedReturns
         shots, hidden = zip(*(bodies.shot(k, cameras) for k in range(len(street.ego))), strict=True)
     x, y, z = setup.position
     told = street.name, cameras, z, STREET_KEYFRAME_S
-    return Film(*told, shots, hidden[0], setup.grid, (x, y), returns=returns)
+    return Film(*told, shots, hidden[0], setup.grid, (x, y), returns=returns, kerbs=street.kerbs)
 
 
 def _check_poses(street: Street, names: Sequence[str], poses: Floats) -> None:

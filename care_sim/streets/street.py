@@ -20,6 +20,7 @@ from care_sim.streets.clutter import Placed, place_clutter
 from care_sim.streets.draft import STEP_S, STREET_KEYFRAME_S, Draft
 from care_sim.streets.drivers import BEYOND_M, drive_joining, drive_main
 from care_sim.streets.furniture import JOINING_M, furnish
+from care_sim.streets.kerbs import kerb_lines
 from care_sim.streets.layouts import LAYOUTS
 from care_sim.streets.people import cross_and_emerge, populate
 
@@ -37,7 +38,7 @@ into the other.
 class Street:
     """Bodies by `kinds` (n,) of the catalogue, with world `poses` (k, n, 3) at every keyframe; the
     ego's `ego` poses (k, 3) and `motion` (k,). `clutter` holds bodies without a class, with their
-    poses.
+    poses. `kerbs` are lines (n, 2) in the world, for pictures.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Street:
     ego: Floats
     motion: tuple[Ego, ...]
     clutter: tuple[Placed, ...] = ()
+    kerbs: tuple[Floats, ...] = ()
 
     def digest(self) -> str:
         """Return SHA-256 over the kinds and over all poses in whole millimetres and milliradians,
@@ -111,6 +113,7 @@ def make_street(seed: int, clutter: bool = False) -> Street:
         drive.poses[::every],
         drive.motion[::every],
         strewn,
+        kerb_lines(plan, span, JOINING_M),
     )
 
 

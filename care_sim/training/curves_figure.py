@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 
 from care_sim.base.errors import percent
 from care_sim.core.arrays import Floats
-from care_sim.reports.figures.styles import colours, default_style, name_ends
+from care_sim.reports.figures.curves import MOST_NAMED
+from care_sim.reports.figures.styles import CALM, colours, default_style, name_ends
 from care_sim.training.curves import (
     TrainingRun,
     interquartile_mean,
@@ -23,6 +24,8 @@ from care_sim.training.curves import (
 )
 from care_sim.training.folder import LEARNER
 
+_FIRST = ("full", "history", "all-camera", "care")
+"""Rules that are named before others: the paper's."""
 _LEVELS = 60
 """Points of a profile."""
 _LINE = 50
@@ -33,7 +36,8 @@ _LINE = 50
 def curves_figure(groups: Sequence[Sequence[TrainingRun]]) -> Figure:
     """Draw a panel per recipe. It has a line per training seed, their interquartile mean with its
     interval if there are several, and rules as horizontal lines. Below is the performance profile
-    of the last evaluation that all runs share.
+    of the last evaluation that all runs share, in the same colours. The learner and six rules have
+    a name, other rules are grey.
     """
     figure = Figure(figsize=(1.2 + 4.6 * len(groups), 7.8), layout="constrained")
     panels = figure.subplots(2, len(groups), squeeze=False)
@@ -54,9 +58,9 @@ def curves_figure(groups: Sequence[Sequence[TrainingRun]]) -> Figure:
 def _draw(axes: Axes, runs: Sequence[TrainingRun]) -> None:
     config = runs[0].config
     learner = config["algorithm"]
-    hues = colours((*runs[0].rules, learner))
+    hues = _hues(runs)
     for name, height in _heights(runs).items():
-        axes.axhline(height, color=hues[name], linestyle="--", linewidth=1.1, zorder=1)
+        axes.axhline(height, **_rule_look(hues[name]), zorder=1)
     for run in runs:
         axes.plot(
             run.steps,
@@ -108,22 +112,19 @@ def _draw_profiles(axes: Axes, runs: Sequence[TrainingRun]) -> None:
     own = [run.each(LEARNER, shared[-1]) for run in runs] if shared else []
     same = len({len(one) for one in own}) == 1
     played |= {learner: np.array(own)} if same else {}
-    hues = colours((*runs[0].rules, learner))
+    hues = _hues(runs)
     every = np.concatenate([scores.ravel() for scores in played.values()])
     levels = np.linspace(every.min(), every.max(), _LEVELS)
     for name, scores in played.items():
         profile = performance_profile(scores, levels)
-        style: dict[str, Any] = (
-            {"linewidth": 2.2} if name == learner else {"linewidth": 1.1, "linestyle": "--"}
-        )
-        axes.plot(levels, [one.value for one in profile], color=hues[name], label=name, **style)
+        style = {"linewidth": 2.2} if name == learner else _rule_look(hues[name])
+        axes.plot(levels, [one.value for one in profile], **{"color": hues[name]} | style)
         if len(scores) > 1:
             low, high = ([getattr(one, end) for one in profile] for end in ("low", "high"))
             axes.fill_between(levels, low, high, color=hues[name], alpha=0.15, linewidth=0)
     axes.set_ylabel("share of episodes above")
     unit = "return" if len(runs[0].tasks) > 1 else runs[0].unit
     axes.set_xlabel(f"{unit}, after {shared[-1]:,} steps" if same else unit)
-    axes.legend()
 
 
 def _middle(scores: Floats) -> float:
@@ -136,8 +137,24 @@ def _heights(runs: Sequence[TrainingRun]) -> dict[str, float]:
     return {rule: _middle(runs[0].scores(rule)) for rule in runs[0].rules}
 
 
+def _rule_look(hue: str) -> dict[str, Any]:
+    width, alpha = (0.7, 0.6) if hue == CALM else (1.1, 1.0)
+    return {"color": hue, "linestyle": "--", "linewidth": width, "alpha": alpha}
+
+
+def _hues(runs: Sequence[TrainingRun]) -> dict[str, str]:
+    """Return the colour of the learner and of every rule: grey for all but seven. The paper's rules
+    come first, then the best others.
+    """
+    learner, heights = runs[0].config["algorithm"], _heights(runs)
+    first = [name for name in _FIRST if name in heights]
+    ranked = dict.fromkeys([learner, *first, *sorted(heights, key=lambda name: -heights[name])])
+    named = colours([*ranked][:MOST_NAMED])
+    return {name: named.get(name, CALM) for name in ranked}
+
+
 def _ends(runs: Sequence[TrainingRun]) -> dict[str, tuple[float, str]]:
-    """Return the right ends of the learner's curve and of the lines, with their colours."""
+    """Return the right ends of the learner's curve and of named lines, with their colours."""
     last = float(np.mean([_middle(run.scores(steps=run.steps[-1])) for run in runs]))
     heights = _heights(runs) | {runs[0].config["algorithm"]: last}
-    return {name: (heights[name], colour) for name, colour in colours(heights).items()}
+    return {name: (heights[name], hue) for name, hue in _hues(runs).items() if hue != CALM}

@@ -19,7 +19,16 @@ from care_sim.perception.matching import found_objects
 from care_sim.perception.measured.recall import FIRST_HIT, recall
 from care_sim.perception.measured.tables import MEASURED, measurement
 from care_sim.perception.proxy import chance
-from care_sim.reports.figures.styles import BLUE, GREEN, INK, ORANGE, default_style, svg_text
+from care_sim.reports.figures.styles import (
+    BLUE,
+    GREEN,
+    INK,
+    ORANGE,
+    YELLOW,
+    default_style,
+    name_ends,
+    svg_text,
+)
 from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.sources.street_films import street_film
 
@@ -30,6 +39,7 @@ FIRST_STREET, EVERY = 1000, 4
 REACH_M = 50.0
 POINTS = ("cluster", "pillars")
 TICKS = (1, 2, 3, 5, 10, 20, 50)
+HUES = (INK, YELLOW, BLUE, ORANGE, GREEN, "#7468C0", "#C2478A")
 
 
 def whole(cloud, _, __):
@@ -94,28 +104,32 @@ def half(name, kind, share):
 
 @default_style()
 def draw(rows, path):
-    """Draw the recall of all by the returns of our full scan."""
+    """Draw the recall of all by the returns of our full scan, with names at the right."""
     returns = np.arange(1, 65)
-    colours = dict(zip(MEASURED, (BLUE, ORANGE, GREEN), strict=True))
+    places = [np.sqrt(least * min(most, 64)) for least, most in BINS]
+    shown = "returns, the proxy", "graded", *MEASURED, *POINTS
+    hues = dict(zip(shown, HUES, strict=True))
     figure = Figure(figsize=(9.2, 3.6), layout="constrained")
     for axes, (title, kind) in zip(figure.subplots(1, 2, sharey=True), KINDS.items(), strict=True):
-        axes.step([1, 3, 3, 64], [0, 0, 100, 100], color=INK, label="returns, the proxy")
-        axes.plot(returns, 100 * chance(kind, returns), "--", color=INK, label="graded")
-        for name, colour in colours.items():
+        curves = {
+            "returns, the proxy": ([1, 3, 3, 64], [0, 0, 100, 100], "-"),
+            "graded": (returns, 100 * chance(kind, returns), "--"),
+        }
+        for name in MEASURED:
             worth = measurement(name).recall.worth[CLASSES.index(kind)]
-            axes.plot(returns, 100 * recall(name, kind, worth * returns), color=colour, label=name)
+            curves[name] = returns, 100 * recall(name, kind, worth * returns), "-"
             if measurement(name).sweeps > 1:
-                axes.plot(returns, 100 * recall(name, kind, worth * returns, 0), ":", color=colour)
-        places = [np.sqrt(least * min(most, 64)) for least, most in BINS]
+                newcomers = 100 * recall(name, kind, worth * returns, 0)
+                axes.plot(returns, newcomers, ":", color=hues[name])
         for name, marker in zip(POINTS, "o^", strict=True):
-            found = by_returns(rows[name, "full"], kind)[:, 0]
-            axes.plot(places, found, marker, color=INK, markersize=5, label=name)
+            curves[name] = places, by_returns(rows[name, "full"], kind)[:, 0], marker
+        for name, curve in curves.items():
+            axes.plot(*curve, color=hues[name], markersize=5)
         axes.set(title=title, xscale="log", xlabel="returns of the full scan", ylim=(0, 102))
         axes.set_xticks(TICKS, [str(tick) for tick in TICKS])
         axes.minorticks_off()
-    figure.axes[0].set_ylabel("detected, percent")
-    figure.axes[1].plot([], [], ":", color=INK, label="newcomers")
-    figure.legend(*figure.axes[1].get_legend_handles_labels(), loc="outside right center")
+    figure.axes[0].set_ylabel("detected, percent (dotted: newcomers)")
+    name_ends(figure, {axes: {name: (own[1][-1], hues[name]) for name, own in curves.items()}})
     path.write_text(svg_text(figure, path.stem), encoding="utf-8")
 
 

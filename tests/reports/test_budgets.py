@@ -14,6 +14,7 @@ from care_sim.reports.budgets import (
 )
 from care_sim.reports.figures.budgets import budgets_figure
 from care_sim.reports.figures.leaderboard import leaderboard_figure
+from care_sim.reports.figures.styles import CALM
 from care_sim.reports.recorded import sources_table
 from care_sim.reports.table import Bold
 from care_sim.study.benchmark.suite import Entry
@@ -226,8 +227,8 @@ def test_every_count_has_a_panel_and_every_entry_a_curve():
     line, *curves = figure.axes[0].get_lines()
     assert {*line.get_ydata()} == {90.0}
     assert len(curves) == len(RESULTS)
-    names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert names == ["care-sector", "care-sector residual=False", "boxes", "place", "full"]
+    names = ["care-sector", "care-sector residual=False", "boxes", "place", "full"]
+    assert {text.get_text() for text in figure.axes[-1].texts} == {*names}
     drawn = dict(zip(names, curves, strict=True))
     assert [*drawn["care-sector"].get_ydata()] == pytest.approx([10, 20, 80, 100, 100, 100, 100])
     assert [*drawn["boxes"].get_xdata()] == pytest.approx([100 * budget for budget in BUDGETS])
@@ -235,6 +236,15 @@ def test_every_count_has_a_panel_and_every_entry_a_curve():
     one, other = drawn["care-sector"], drawn["care-sector residual=False"]
     assert one.get_color() == other.get_color() != drawn["boxes"].get_color()
     assert one.get_linestyle() != other.get_linestyle()
+
+
+def test_the_first_seven_results_have_a_name_in_their_colour_and_others_are_grey():
+    results = [made_budgets("place", HALF_WAY), *(made_budgets(f"p{n}", ALWAYS) for n in range(8))]
+    *_, last = budgets_figure(results).axes
+    names = {text.get_text(): text.get_color() for text in last.texts}
+    assert {*names} == {"place", *(f"p{n}" for n in range(6))}
+    drawn = [line.get_color() for line in last.get_lines()[1:]]
+    assert sorted(drawn) == sorted([*names.values(), CALM, CALM])
 
 
 def test_the_figure_of_the_leaderboard_has_a_line_per_entry_and_never_at_its_end():

@@ -1,9 +1,11 @@
-"""The tables of detectors, of scenes worked by hand."""
+"""The tables and the figure of detectors, of scenes worked by hand."""
 
 import numpy as np
+import pytest
 
 from care_sim.evaluation.detector_quality import SceneBoxes
 from care_sim.reports.detectors import detector_tables
+from care_sim.reports.figures.detectors import detectors_figure
 from care_sim.study.judging import JudgedScene
 
 
@@ -56,3 +58,21 @@ def test_class_by_class_at_the_precision_of_the_other():
     *_, at_least, alike = by_class.rows
     assert at_least[:6] == ("sure", "0.85", "50.0", "100.0", "-", "-")
     assert alike[:6] == ("sure", "*", "100.0", "66.7", "-", "-")
+
+
+def test_every_detector_has_its_name_at_the_end_of_its_curve():
+    few, many = [19, 0.1, 0.0], [20, 0.9, 0.8]
+    steps = {"plain": [[1.0, 0.5, 0.9]], "sure": [[0.9, 0.2, 1.0], [0.4, 0.6, 0.7]], "none": []}
+    figure = detectors_figure(
+        {
+            name: {"score, recall, precision": own, "boxes, mean score, share right": [few, many]}
+            for name, own in steps.items()
+        }
+    )
+    left, right = figure.axes
+    names = {text.get_text(): text.xy for text in left.texts}
+    assert {*names} == {"plain", "sure"}
+    assert names["plain"] == pytest.approx((50, 90))
+    assert names["sure"] == pytest.approx((60, 70))
+    # A tenth of few boxes says little.
+    assert right.lines[0].get_xydata().tolist() == [[0.9, 0.8]]

@@ -67,6 +67,14 @@ def test_the_notebook_shows_what_came_out(site):
     assert 'href="quickstart.html"' in (site / "index.html").read_text()
 
 
+def test_sections_are_tabs_beside_the_logo(site):
+    text = (site / "index.html").read_text()
+    tabs = re.findall(r'class="md-tabs__link">\s*(.+?)\s*</a>', text)
+    assert tabs[:3] == ["Start", "Environments", "Guides"]
+    assert 'src="logo.svg"' in text
+    assert (site / "logo.svg").is_file()
+
+
 @pytest.fixture(scope="module")
 def address(site):
     server = ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=str(site)))

@@ -52,6 +52,7 @@ def test_a_film_shows_every_keyframe_in_order(street, film):
     assert [shot.time_s for shot in film.shots] == [0.0, 0.5, 1.0, 1.5]
     assert len({shot.token for shot in film.shots}) == 4
     assert tuple(shot.ego for shot in film.shots) == street.motion
+    assert film.kerbs == street.kerbs != ()
 
 
 def test_returns_of_an_object_lie_in_its_box(film):

@@ -89,6 +89,17 @@ def test_vehicles_keep_the_limit_and_drive_forwards(street):
     assert (ahead[driving] > 0).all()
 
 
+def test_vehicles_park_beside_a_kerb_and_drive_over_none(street):
+    vehicles = np.flatnonzero(np.isin(street.kinds, VEHICLES))
+    kerbs = np.concatenate(street.kerbs)
+    places = street.poses[::3, vehicles, :2]
+    gaps = np.hypot(*np.moveaxis(places[..., None, :] - kerbs, -1, 0)).min(axis=-1)
+    near = np.hypot(*np.moveaxis(places - street.ego[::3, None, :2], -1, 0)) < 50
+    is_parked = speeds_of(street.poses)[:, vehicles].max(axis=0) == 0
+    assert gaps[:, is_parked][near[:, is_parked]] == pytest.approx(1.25, abs=0.3)
+    assert (gaps[:, ~is_parked][near[:, ~is_parked]] > 3.0).all()
+
+
 def test_the_ego_moves_as_its_odometry_says(street):
     motion = np.array([[ego.speed, ego.yaw_rate] for ego in street.motion])
     speeds = speeds_of(street.ego[:, None])[:, 0]

@@ -11,6 +11,7 @@ from hypothesis.extra.numpy import arrays
 
 from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
+from care_sim.reports.figures.styles import CALM
 from care_sim.training.config import PpoConfig, SacConfig
 from care_sim.training.curves import (
     curves_table,
@@ -92,7 +93,7 @@ def test_environments_weigh_alike_whatever_their_returns_are(tmp_path):
     curve, profile = curves_figure([runs]).axes
     (thick,) = (line for line in curve.lines if line.get_linewidth() > 2)
     np.testing.assert_allclose(thick.get_ydata(), [0.1, 0.7])
-    (own,) = (line for line in profile.lines if line.get_label() == "ppo")
+    (own,) = (line for line in profile.lines if line.get_linewidth() > 2)
     # Returns of -12, -8, -40 and 0, twice each: all above -200, none above 0.
     assert own.get_ydata()[0] == 1.0
     assert own.get_ydata()[-1] == 0.0
@@ -159,6 +160,19 @@ def test_a_panel_a_task_a_line_a_seed_and_their_mean(folders, tmp_path):
     figure.canvas.draw()
     assert "0.1" in {label.get_text() for label in alone.get_xticklabels()}, "thousands of steps"
     assert {text.get_text() for text in both.texts} == {"random", "care", "full", "ppo"}
+
+
+def test_the_learner_the_papers_rules_and_the_best_others_are_named(tmp_path):
+    rules = {"random": 1.0, "rows": 2.0, "place": 14.0, "fan": 13.0, "history": 1.5, "full": 16.0}
+    rules |= {"care": 12.0, "all-camera": 1.8}
+    rows = [(rule, 0, "CARE-Dense-v0", 0.0, metres) for rule, metres in rules.items()]
+    rows.append(("learner", 0, "CARE-Dense-v0", 0.0, 5.0))
+    run = read_run(written(tmp_path / "run", PpoConfig(), 1, rows))
+    above, below = curves_figure([[run]]).axes
+    names = {text.get_text() for text in above.texts}
+    assert names == {"ppo", "full", "care", "history", "all-camera", "place", "fan"}
+    for axes in (above, below):
+        assert [line.get_color() for line in axes.lines].count(CALM) == 2
 
 
 @pytest.mark.filterwarnings("error")

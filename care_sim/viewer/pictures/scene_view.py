@@ -10,6 +10,7 @@ from PIL import Image, ImageDraw
 
 from care_sim.core.arrays import Floats
 from care_sim.core.cells.boxes import box_corners, planar_ranges
+from care_sim.core.frames import Frame, turned
 from care_sim.core.residual import wedge_rays
 from care_sim.core.rig import Rig
 from care_sim.evaluation.sightings import RANGE_M
@@ -30,7 +31,10 @@ _CAR = np.array([0.0, 0.0, 0.0, *CATALOGUE["ego"].size, 0.0])
 _AROUND = np.array([0.0, 0.0, 0.0, 1.8, 1.8, 0.0, 0.0])
 """Added length and width of a box's second line."""
 _RING_COLOUR = (52, 56, 63)
+KERB_COLOUR = (138, 130, 110)
 RETURN_COLOUR = (172, 176, 184)
+DETECTED_COLOUR, MISSED_COLOUR = palette.FAINT_INK, (118, 123, 132)
+"""Colours of objects that are no newcomers."""
 TRACK_COLOUR = (205, 160, 255)
 _AHEAD_S = 1.0
 """Duration of the motion that a forecast's line shows."""
@@ -47,10 +51,10 @@ azimuth is extreme.
 _LINE = 18
 """Height of a line of the legend, pixels."""
 _OBJECTS = (
-    State("found", palette.FOUND_COLOUR),
-    State("not found", palette.NOT_FOUND_COLOUR),
-    State("beyond 50 m", palette.UNSCORED_COLOUR),
-    State("double line: its first sighting", palette.INK),
+    State("newcomer, detected", palette.FOUND_COLOUR),
+    State("newcomer, missed", palette.NOT_FOUND_COLOUR),
+    State("other object, detected", DETECTED_COLOUR),
+    State("other object, not detected", MISSED_COLOUR),
 )
 _SCAN = (State("small dots: returns", RETURN_COLOUR),)
 _KNOWN = (
@@ -69,27 +73,27 @@ def scene_view(
     """Return the view of the last of the keyframes `frames`, which `loop` has just played or plays
     next.
 
-    The map shows annotated objects (detected, undetected, or beyond the scored range) and the
-    returns of fired cells. Appearing objects have a double line. If the keyframe was `watched`,
-    appearing objects have a name. The map then also shows what was known when the cells were
-    chosen: forecasts of tracks, and camera detections, which have no depth. The episode is left as
-    it was.
+    The map shows the road's edges, if the film knows them, annotated objects, and the returns of
+    fired cells. Newcomers have a colour and a double line, all other objects are grey. If the
+    keyframe was `watched`, newcomers have a name. The map then also shows what was known when the
+    cells were chosen: forecasts of tracks, and camera detections, which have no depth. The episode
+    is left as it was.
     """
     last = frames[-1]
     entries = sum(frame.entries for frame in frames)
     found = sum(frame.entries_found for frame in frames)
     told = State(
-        f"{found} of {entries} first sightings found at once",
+        f"{found} of {entries} newcomers detected in their first frame",
         palette.FOUND_COLOUR if found == entries else palette.NOT_FOUND_COLOUR,
     )
     return View(
         rig=loop.rig,
         time_s=last.time_s,
-        progress=f"{last.objects_found} of {last.objects} objects found",
+        progress=f"{last.objects_found} of {last.objects} detected",
         braking=False,
         contact=None,
         aside=loop.film.name[:28],
-        verdict=told if entries else State("no first sighting yet", palette.FAINT_INK),
+        verdict=told if entries else State("no newcomer yet", palette.FAINT_INK),
         fired=last.fired,
         ranges=loop.last_ranges,
         shares=watched.shares if watched else None,
@@ -104,10 +108,12 @@ def _scenery(
     size = PICTURE_WIDTH if whole else PANEL_WIDTH, MAP_HEIGHT
     street = _Map(Image.new("RGB", size, palette.BACKGROUND))
     street.draw_rings()
+    shot = loop.film.shots[keyframe.index]
+    street.draw_kerbs(loop.film.kerbs, shot.sensor)
     if watched:
         street.draw_wedges(loop.rig, watched.situation)
     street.draw_returns(loop, watched)
-    street.draw_objects(loop.film.shots[keyframe.index].annotations.boxes, keyframe)
+    street.draw_objects(shot.annotations.boxes, keyframe)
     if watched:
         street.draw_tracks(watched.situation)
         street.name_sightings(watched.situation, keyframe)
@@ -154,6 +160,12 @@ class _Map:
             at = right - 4, (top + bottom) / 2
             write(self.draw, at, f"{metres:.0f} m", 11, palette.FAINT_INK, "rm")
 
+    def draw_kerbs(self, kerbs: Sequence[Floats], sensor: Frame) -> None:
+        """Draw lines (n, 2) in the world."""
+        for line in kerbs:
+            seen = turned(line - sensor.origin[:2], -sensor.yaw)
+            self.draw.line(self._pixels(seen).ravel().tolist(), KERB_COLOUR)
+
     def draw_returns(self, loop: OpenLoop, watched: Watched | None) -> None:
         """Draw the returns, in the colours of their shares if known."""
         cells, points = returned(loop.last_ranges, loop.rig.grid)
@@ -164,15 +176,15 @@ class _Map:
             self.draw.rectangle((x, y, x + 1, y + 1), tuple(colour))
 
     def draw_objects(self, boxes: Floats, keyframe: SceneKeyframe) -> None:
-        """Draw the car, and the annotated boxes (n, 7) in the colours of their states; appearing
-        ones have a second line.
-        """
+        """Draw the car and the annotated boxes (n, 7), newcomers last, so that none is hidden."""
         self._draw_box(_CAR, palette.INK, 2)
-        for row, box in enumerate(boxes):
-            colour = palette.found_colour(keyframe, row)
-            self._draw_box(box, colour, 2)
+        for row in np.argsort(keyframe.appearing, kind="stable").tolist():
             if keyframe.appearing[row]:
-                self._draw_box(box + _AROUND, colour, 1)
+                colour = palette.found_colour(keyframe, row)
+                self._draw_box(boxes[row] + _AROUND, colour, 1)
+            else:
+                colour = DETECTED_COLOUR if keyframe.found[row] else MISSED_COLOUR
+            self._draw_box(boxes[row], colour, 2)
 
     def draw_wedges(self, rig: Rig, situation: TrueSituation) -> None:
         """Draw the rays through the left and right of every image box, up to the scored range."""

@@ -24,7 +24,7 @@ from care_sim.viewer.pictures.keyframe import (
     draw_keyframe,
     draw_panel,
 )
-from care_sim.viewer.pictures.scene_view import scene_view
+from care_sim.viewer.pictures.scene_view import MISSED_COLOUR, scene_view
 from tests.helpers.lidars import CORNERS, STACK
 
 HEIGHT = 720
@@ -74,7 +74,7 @@ def test_it_has_one_size_before_and_after_the_first_scan_and_changes_no_observat
     assert all(np.any(one != later) for one, later in pairwise(pictures))
     # Nothing hides the vehicle of a cut-in of UN Regulation 157.
     state = palette.IN_VIEW if "R157" in world[0] else palette.OUT_OF_VIEW
-    assert shows(pictures[0], palette.NOT_FOUND_COLOUR if film else state.colour)
+    assert shows(pictures[0], MISSED_COLOUR if film else state.colour)
     for plain, drawn in zip(play(world, draw=False)[0], seen, strict=True):
         assert all(np.array_equal(plain[key], drawn[key]) for key in plain)
 

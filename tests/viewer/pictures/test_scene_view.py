@@ -1,5 +1,7 @@
 """The map of the open loop: who is found, who appears, what was known, what each share paid."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -18,7 +20,10 @@ from care_sim.viewer.pictures.keyframe import (
     draw_keyframe,
 )
 from care_sim.viewer.pictures.scene_view import (
+    DETECTED_COLOUR,
+    KERB_COLOUR,
     MAP_HEIGHT,
+    MISSED_COLOUR,
     RETURN_COLOUR,
     TRACK_COLOUR,
     scene_view,
@@ -55,10 +60,11 @@ def play(drive):
     """The keyframes of a policy in the drive, with their pictures."""
     source = source_of(f"argoverse2:{drive}")
 
-    def make(policy, budget):
+    def make(policy, budget, kerbs=()):
         (config,) = play_grid(source, source.scenes(), [policy], [budget])
         kept = []
-        trace_scene(config, config.film(), wrap=lambda env, policy: Drawn(env, policy, kept))
+        film = replace(config.film(), kerbs=kerbs)
+        trace_scene(config, film, wrap=lambda env, policy: Drawn(env, policy, kept))
         return kept
 
     return make
@@ -74,22 +80,31 @@ def count(part, colour):
     return int(np.all(part == colour, axis=-1).sum())
 
 
-def test_what_fired_decides_what_is_drawn_as_found_and_who_appears_has_a_second_line(play):
-    full, ((_, starved, _), *_) = play("full", 1.0), play("random", 1e-4)
-    assert count(full[0][1][MAP], FOUND_COLOUR) > 50
+def test_newcomers_alone_have_a_colour_which_says_whether_they_are_detected(play):
+    full, starved = play("full", 1.0), play("random", 1e-4)
+    for picture, other in ((full[0][1], DETECTED_COLOUR), (starved[0][1], MISSED_COLOUR)):
+        assert count(picture[MAP], other) > 50
+        assert count(picture[MAP], FOUND_COLOUR) == count(picture[MAP], NOT_FOUND_COLOUR) == 0
     assert count(full[0][1][MAP], RETURN_COLOUR) > 500
-    assert count(starved[MAP], FOUND_COLOUR) == 0
-    assert count(starved[MAP], NOT_FOUND_COLOUR) > 50
     # A return is a square of four pixels.
-    assert count(starved[MAP], RETURN_COLOUR) <= 8
-    plain, known = (
-        [sum(count(each[which][MAP], c) for c in (FOUND_COLOUR, NOT_FOUND_COLOUR)) for each in full]
-        for which in (1, 2)
-    )
-    assert plain[STEPS_OUT] > plain[STEPS_OUT + 1] + 10
-    # Where it is known what the policy knew, the person has a name at that keyframe alone.
-    names = [known - plain for known, plain in zip(known, plain, strict=True)]
-    assert names.pop(STEPS_OUT) > max(names) + 50
+    assert count(starved[0][1][MAP], RETURN_COLOUR) <= 8
+    for played, colour in ((full, FOUND_COLOUR), (starved, NOT_FOUND_COLOUR)):
+        plain, known = ([count(each[which][MAP], colour) for each in played] for which in (1, 2))
+        assert np.flatnonzero(plain).tolist() == [STEPS_OUT]
+        # Where it is known what the policy knew, the person also has a name.
+        assert known[STEPS_OUT] > plain[STEPS_OUT] + 50
+
+
+def test_kerbs_are_drawn_where_the_film_has_them(play, drawn):
+    """A kerb 5 m left of the car, which drives along it."""
+    kerb = np.array([[-20.0, 5.0], [30.0, 5.0]])
+    assert all(count(picture, KERB_COLOUR) == 0 for _, picture, _ in drawn)
+    scale = MAP_HEIGHT / 104
+    for watched, picture, _ in play("random", 1e-4, kerbs=(kerb,)):
+        rows, columns = np.nonzero(np.all(picture[MAP] == KERB_COLOUR, axis=-1))
+        assert set(rows.tolist()) == {int(MAP_HEIGHT / 2 - 5 * scale)}
+        ends = PICTURE_WIDTH / 2 + scale * (kerb[:, 0] - watched.situation.sensor.x)
+        assert [columns.min(), columns.max()] == pytest.approx(ends, abs=2)
 
 
 def test_cells_lie_in_the_grid_in_the_colour_of_their_share(drawn):
