@@ -195,7 +195,7 @@ def film_of_boxes(
     Raises InvalidInput with scene, time and object for what no drive holds.
     """
     setup = sensor_setup(sensor)
-    times = _numbers(f"{name}: times_s", times_s, (-1,), TIMES_S)
+    times = _numbers(f"{name}: times_s (seconds)", times_s, (-1,), TIMES_S)
     # A float holds a time since 1970 to 0.2 us only. Keyframes 0.5 s apart stay 0.5 s apart.
     if len(times) and times[0] >= STAMP_S:
         times = np.round(times - times[0], 6)
@@ -261,7 +261,7 @@ def _body(
     named = f"{place}: object {shown(box['id'])}"
     if label is not None:
         check_known(f"class of {named}", label, CLASSES)
-    if not isinstance(box["id"], str | int):
+    if not isinstance(box["id"], str | int | np.integer):
         raise InvalidInput(f"{named}: id must be a text or a whole number")
     length, width, height = _numbers(f"{named}: size", box["size"], (3,), SIZES_M).tolist()
     pose = _numbers(f"{named}: pose", box["pose"], (4,), MAP_M)

@@ -250,8 +250,20 @@ def test_times_since_1970_give_the_film_of_times_from_the_start(step):
     assert film_hash(stamped) == film_hash(plain)
 
 
+def test_an_id_of_numpy_is_a_number():
+    given = told()
+    numbers = [[one | {"id": n} for n, one in enumerate(boxes)] for boxes in given["boxes"]]
+    numpy = [[one | {"id": np.int32(one["id"])} for one in boxes] for boxes in numbers]
+    ours, theirs = (
+        care_sim.film_of_boxes(**given | {"boxes": boxes}) for boxes in (numbers, numpy)
+    )
+    assert film_hash(ours) == film_hash(theirs)
+
+
 @pytest.mark.parametrize("unit", [1e3, 1e9])
 def test_other_units_since_1970_are_refused(unit):
     times = [unit * (1.7e9 + 0.5 * k) for k in range(6)]
-    with pytest.raises(InvalidInput, match=r"mine: times_s must lie in \[-1e\+08, 4\.6.*e\+09\]"):
+    with pytest.raises(
+        InvalidInput, match=r"mine: times_s \(seconds\) must lie in \[-1e\+08, 4\.6.*e\+09\]"
+    ):
         care_sim.film_of_boxes(**told(times_s=times))
