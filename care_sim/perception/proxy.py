@@ -160,7 +160,7 @@ def read_curves(file: str | os.PathLike[str]) -> Curves:
     all classes. Raises InvalidInput for anything else.
     """
     # Imported here because it loads PyArrow.
-    from care_sim.base.csv_tables import columns_of, read_csv, texts_of
+    from care_sim.perception.csv_tables import columns_of, read_csv, texts_of
 
     check_path("file", file)
     path = Path(file)

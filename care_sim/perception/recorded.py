@@ -110,7 +110,7 @@ def _results(path: Path, _stamp: Stamp) -> dict[str, list[Any]]:
 def _csv_results(path: Path, _stamp: Stamp) -> dict[str, Detections]:
     """Return the boxes of every keyframe, in the sensor frame."""
     # Imported here because it loads PyArrow.
-    from care_sim.base.csv_tables import columns_of, read_csv, texts_of
+    from care_sim.perception.csv_tables import columns_of, read_csv, texts_of
 
     table = read_csv(path)
     tokens, names = (texts_of(path, table, column) for column in COLUMNS[:2])

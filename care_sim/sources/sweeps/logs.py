@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from care_sim.base.csv_tables import columns_of, read_csv
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame
+from care_sim.perception.csv_tables import columns_of, read_csv
 from care_sim.sources.film_checks import FULL_TURN, MAP_M, check_span, quaternion_fault
 from care_sim.sources.sweeps.points import READERS, in_seconds, read_sweep
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from care_sim.base.csv_tables import columns_of, read_csv
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
+from care_sim.perception.csv_tables import columns_of, read_csv
 from care_sim.sources.film_checks import REACH_M
 from care_sim.sources.nuscenes.sweeps import FULL_INTENSITY, MOST_SWEEP_BYTES, RINGS
 
