@@ -23,6 +23,7 @@ from care_sim.study.benchmark.recorded import RecordedDrive, recorded_drives
 from care_sim.study.benchmark.result import with_references
 from care_sim.study.benchmark.suite import STREETS, Entry, Salt, fresh_seeds
 from care_sim.study.executors import processes
+from care_sim.study.rows.parameters import parameters
 from care_sim.study.run_config import RunConfig
 from care_sim.study.runner import by_reason
 
@@ -33,12 +34,13 @@ def benchmark(options: Benchmark) -> int:
     check_values(options, "policy")
     salt = Salt.read(options.sealed) if options.sealed else None
     drives = recorded_drives(options.recorded)
+    looking = parameters(options.detector_parameters)
     published = budget_worlds(options.quick, options.closed_loop, drives, options.without_streets)
 
     def first_tasks(entry: Entry) -> Sequence[RunConfig]:
         # One world of every part is enough to see whether a policy can be made.
         return [
-            budget_tasks(entry, part, own[:1], options.detector)[0][-1]
+            budget_tasks(entry, part, own[:1], options.detector, looking)[0][-1]
             for part, own in published.items()
         ]
 
@@ -57,7 +59,9 @@ def benchmark(options: Benchmark) -> int:
         # Sealed worlds are numbers, from which the salt draws seeds.
         worlds = {STREETS: range(len(published[STREETS]))}
     with player_in(options.out, options.workers, processes) as player:
-        results = play_budgets(entries, player, options.detector, worlds, options.quick, salt)
+        results = play_budgets(
+            entries, player, options.detector, worlds, options.quick, salt, looking
+        )
     for result in results:
         result.write(files[result.entry])
     if results:
@@ -83,7 +87,8 @@ def _kind(options: Benchmark, drives: Sequence[RecordedDrive], salt: Salt | None
         f"fresh-{options.fresh}": options.fresh,
         f"sealed-{salt.digest[:8] if salt else ''}": salt,
     }
-    return ".".join([options.detector, *(name for name, on in marks.items() if on)])
+    own = "-".join([options.detector, *options.detector_parameters])
+    return ".".join([re.sub(r"[^\w.=-]+", "-", own), *(name for name, on in marks.items() if on)])
 
 
 def _file(options: Benchmark, entry: Entry, kind: str) -> Path:

@@ -52,8 +52,13 @@ def _tables(found: dict[Path, BudgetResult]) -> list[list[BudgetResult]]:
         return [references(MAIN_DETECTOR)]
     sets: dict[object, list[BudgetResult]] = {}
     for each in found.values():
-        sets.setdefault((each.detector, each.sealed, each.worlds), []).append(each)
+        sets.setdefault(_worlds_of(each), []).append(each)
     return [with_references(own) for own in sets.values()]
+
+
+def _worlds_of(result: BudgetResult) -> tuple[object, ...]:
+    """Return what two results share that can be compared."""
+    return result.detector, result.detector_parameters, result.sealed, result.worlds
 
 
 def _show(options: Leaderboard, sets: Sequence[Sequence[BudgetResult]]) -> None:
@@ -120,7 +125,7 @@ def _read(places: Sequence[Path]) -> tuple[dict[Path, BudgetResult], list[str]]:
             continue
         # Two people may call theirs mine:Mine; one policy has the same code and files.
         key = (
-            *(result.detector, result.sealed, result.worlds),
+            *_worlds_of(result),
             *(result.entry.full_name, own_code_of(result.made_by)),
         )
         if key in first:

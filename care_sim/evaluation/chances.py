@@ -7,6 +7,7 @@ luck lasts, and a lucky object is tracked.
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from care_sim.perception.detectors import GRADED
 from care_sim.perception.measured.detector import cell_angles, sweep_weights
 from care_sim.perception.measured.recall import FIRST_HIT, recall
 from care_sim.perception.measured.tables import MEASURED, measurement
-from care_sim.perception.proxy import chance
+from care_sim.perception.proxy import CURVES, Curves, chance, read_curves
 from care_sim.sensors.annotated import Annotations, Cloud
 
 _Rule = Callable[[str, Floats, Floats], Floats]
@@ -30,8 +31,10 @@ _Rule = Callable[[str, Floats, Floats], Floats]
 class Chances:
     """Meter of the returns on every annotated object, keyframe by keyframe of an open loop."""
 
-    def __init__(self, rule: _Rule, weights: Floats, angles: Floats, rig: Rig):
-        self._rule = rule
+    def __init__(
+        self, rule: _Rule, weights: Floats, angles: Floats, rig: Rig, counts_all: bool = False
+    ):
+        self._rule, self._counts_all = rule, counts_all
         self._weights, self._angles = weights, angles
         self._heads = [head.first for head in rig.grid.heads]
         self._counts: list[dict[int, float]] = []
@@ -42,7 +45,10 @@ class Chances:
         """Return the meter of a detector, None if its chances are unknown."""
         alike = np.ones(len(rig.grid.heads))
         if detector == GRADED:
-            return cls(_graded, np.ones(1), alike, rig)
+            file = parameters.get("file")
+            curves = CURVES if file is None else read_curves(file)
+            # The graded proxy counts the returns of all sweeps.
+            return cls(partial(_graded, curves), np.ones(1), alike, rig, counts_all=True)
         if detector not in MEASURED:
             return None
         first_hit = parameters.get("first_hit", FIRST_HIT)
@@ -54,7 +60,7 @@ class Chances:
         """Note the keyframe that was just played."""
         annotations = loop.film.shots[loop.index - 1].annotations
         now = self._returns(loop.handed, annotations)
-        if self._rule is not _graded:
+        if not self._counts_all:
             now = now / max(len(loop.handed.poses), 1)
         self._counts.insert(0, dict(zip(annotations.objects.tolist(), now.tolist(), strict=True)))
         del self._counts[len(self._weights) :]
@@ -92,9 +98,9 @@ class Chances:
         return np.asarray(np.bincount(places, self._angles[heads], len(annotations)), float)
 
 
-def _graded(name: str, now: Floats, _average: Floats) -> Floats:
-    """Return the chances of the graded proxy, which counts the returns of all sweeps."""
-    return chance(name, now.astype(np.int64))
+def _graded(curves: Curves, name: str, now: Floats, _average: Floats) -> Floats:
+    """Return the chances of the graded proxy."""
+    return chance(name, now.astype(np.int64), curves)
 
 
 def measured_rule(detector: str, parameters: Mapping[str, Any]) -> _Rule:

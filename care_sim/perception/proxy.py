@@ -4,12 +4,15 @@ A real detector reads only points, and `care_sim.perception.points_only.PointsOn
 `care_sim.perception.detectors.make_detector` returns either by name.
 """
 
-from collections.abc import Callable, Mapping
+import os
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
-from care_sim.base.checks import check_whole
+from care_sim.base.checks import check_known, check_path, check_whole
 from care_sim.base.compiled import compiled
+from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.types import CLASSES, Detections
@@ -132,14 +135,53 @@ _PEOPLE = (
 numbers the share is linear in the logarithm of the number. The dip of cars at about eight returns
 is levelled out.
 """
-CURVES = {name: _PEOPLE if name in ("bicycle", "pedestrian") else _VEHICLES for name in CLASSES}
+Curves = Mapping[str, tuple[Sequence[float], Sequence[float]]]
+"""Per class ascending numbers of returns, and the share detected at each."""
+CURVES: Curves = {
+    name: _PEOPLE if name in ("bicycle", "pedestrian") else _VEHICLES for name in CLASSES
+}
 
 
-def chance(name: str, returns: Integers) -> Floats:
-    """Return (n,) the detection probability of an object of class `name` with `returns` (n,)."""
-    numbers, shares = CURVES[name]
-    known = np.log(np.maximum(returns, 1))
-    return np.asarray(np.interp(known, np.log(numbers), shares))
+def chance(name: str, returns: Integers, curves: Curves = CURVES) -> Floats:
+    """Return (n,) the detection probability of an object of class `name` with `returns` (n,).
+
+    It is 0 below the first number of the curve, and for a class without a curve.
+    """
+    if name not in curves:
+        return np.zeros(len(returns))
+    numbers, shares = curves[name]
+    # No returns are fewer than one, the least first number.
+    known = np.log(np.maximum(returns, 0.5))
+    return np.asarray(np.interp(known, np.log(numbers), shares, left=0.0))
+
+
+def read_curves(file: str | os.PathLike[str]) -> Curves:
+    """Read a CSV table with the columns `returns` and `recall`, and `class` unless one curve is for
+    all classes. Raises InvalidInput for anything else.
+    """
+    # Imported here because it loads PyArrow.
+    from care_sim.perception.csv_tables import columns_of, read_csv, texts_of
+
+    check_path("file", file)
+    path = Path(file)
+    table = read_csv(path)
+    rows = columns_of(path, table, ("returns", "recall"))
+    names = np.array(texts_of(path, table, "class") if "class" in table.column_names else [])
+    curves = {}
+    for name in dict.fromkeys(names.tolist()) if len(names) else CLASSES:
+        check_known(f"class in {path}", name, CLASSES)
+        numbers, shares = rows[names == name if len(names) else slice(None)].T
+        if not (len(numbers) and numbers[0] >= 1 and (np.diff(numbers) > 0).all()):
+            raise InvalidInput(
+                f"{path}: returns of {name} must ascend from 1 or more, got "
+                f"{shown(numbers.tolist())}"
+            )
+        if not ((shares >= 0) & (shares <= 1)).all():
+            raise InvalidInput(
+                f"{path}: recall of {name} must lie in [0, 1], got {shown(shares.tolist())}"
+            )
+        curves[name] = (numbers.tolist(), shares.tolist())
+    return curves
 
 
 class GradedProxy(Detector):
@@ -151,13 +193,16 @@ class GradedProxy(Detector):
     begins later and is never certain. `CURVES` are measured on the detector `cluster`: its recall
     of annotated objects within 50 m, by their returns in a full scan. They cover every fourth
     keyframe of the 20 calibration streets (4,500 objects). Vehicles need more returns than people,
-    since a part of one is taken for something smaller.
+    since a part of one is taken for something smaller. A CSV `file` replaces them (`read_curves`).
 
     The luck of an object depends only on its place from the sensor, in centimetres. It is the same
-    for all policies while their cars drive alike, and more returns never lose an object. Luck is
-    drawn anew at every keyframe if anything moves. A standing object before a standing car keeps
-    its luck.
+    for all policies while their cars drive alike, and more returns never lose an object, unless the
+    curve falls. Luck is drawn anew at every keyframe if anything moves. A standing object before a
+    standing car keeps its luck.
     """
+
+    def __init__(self, file: str | os.PathLike[str] | None = None):
+        self._curves = CURVES if file is None else read_curves(file)
 
     def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
         """See `care_sim.perception.points_only.Detector`."""
@@ -170,7 +215,7 @@ class GradedProxy(Detector):
         chances = np.zeros(len(annotations))
         for number, name in enumerate(CLASSES):
             of_class = annotations.classes == number
-            chances[of_class] = chance(name, returns[of_class])
+            chances[of_class] = chance(name, returns[of_class], self._curves)
         (found,) = np.nonzero(_luck(annotations.boxes) < chances)
         detections = Detections(
             annotations.classes[found], annotations.boxes[found], returns[found]

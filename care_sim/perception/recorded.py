@@ -3,24 +3,29 @@ scans.
 """
 
 import os
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from care_sim.base.checks import check_number, check_path, check_whole
+from care_sim.base.checks import check_known, check_number, check_path, check_whole
 from care_sim.base.digests import Stamp, file_stamp
-from care_sim.base.errors import InvalidInput
+from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.files import parsed_json
-from care_sim.core.arrays import Integers
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame
 from care_sim.core.types import CLASSES, Detections
 from care_sim.perception.points_only import ATTRIBUTES, Detector, inside, objects_behind
 from care_sim.sensors.annotated import Annotations, Cloud
 
+BOX = ("x", "y", "z", "length", "width", "height", "yaw", "score")
+COLUMNS = ("keyframe", "class", *BOX)
+"""Columns of a CSV file of results."""
 FARTHEST_M = 1e7
 """Largest coordinate of a map, metres."""
+FULL_TURN = 2 * np.pi + 1e-6
 _MARGIN_M = 0.2
 """Reported boxes are off by a few centimetres, and returns lie on the surface of the object."""
 
@@ -32,6 +37,11 @@ class RecordedDetector(Detector):
     keyframes of the film. A box counts if it holds `least_returns` of the policy's returns. The
     detector saw the full scan, so it might have missed the object with fewer. Boxes below
     `track_score` become no track.
+
+    A file `.csv` serves every film: a row per box, with COLUMNS in metres and radians of the
+    LiDAR's frame at the keyframe. That frame has x ahead, y left, z up, and its origin in the
+    LiDAR. `keyframe` is the token of a `care_sim.loops.film.Shot`. A keyframe without boxes has a
+    row with an empty class.
     """
 
     def __init__(
@@ -43,7 +53,8 @@ class RecordedDetector(Detector):
         self._least_returns = least_returns
         check_path("file", file)
         self._file = Path(file)
-        self._results = _results(self._file, file_stamp(self._file))
+        read = _csv_results if self._file.suffix == ".csv" else _results
+        self._results: Mapping[str, Any] = read(self._file, file_stamp(self._file))
         self._here: tuple[str, Frame] | None = None
 
     def at(self, token: str | None, sensor: Frame) -> None:
@@ -59,10 +70,12 @@ class RecordedDetector(Detector):
         whose keyframes nobody recorded.
         """
         if self._here is None:
-            raise InvalidInput("the detector recorded plays films of nuScenes alone")
+            raise InvalidInput("the detector recorded plays films alone, and this is no film")
         token, sensor = self._here
         cloud = cloud.whole
-        reported = _detections(self._file, token, self._results[token], sensor)
+        reported = self._results[token]
+        if not isinstance(reported, Detections):
+            reported = _detections(self._file, token, reported, sensor)
         grown = reported.boxes.copy()
         grown[:, 3:6] += 2 * _MARGIN_M
         held = inside(cloud.points, grown).sum(axis=1)
@@ -91,6 +104,43 @@ def _results(path: Path, _stamp: Stamp) -> dict[str, list[Any]]:
             "the nuScenes detection task"
         )
     return results
+
+
+@lru_cache(maxsize=2)
+def _csv_results(path: Path, _stamp: Stamp) -> dict[str, Detections]:
+    """Return the boxes of every keyframe, in the sensor frame."""
+    # Imported here because it loads PyArrow.
+    from care_sim.perception.csv_tables import columns_of, read_csv, texts_of
+
+    table = read_csv(path)
+    tokens, names = (texts_of(path, table, column) for column in COLUMNS[:2])
+    numbers = columns_of(path, table, BOX)
+    rows: dict[str, list[int]] = {}
+    for number, (token, name) in enumerate(zip(tokens, names, strict=True)):
+        own = rows.setdefault(token, [])
+        if not name:
+            continue
+        check_known(f"class in line {number + 2} of {path}", name, CLASSES)
+        _check_box(f"{path}, line {number + 2}", numbers[number])
+        own.append(number)
+    return {
+        token: Detections(
+            np.array([CLASSES.index(names[row]) for row in own], np.int64),
+            numbers[own, :7],
+            np.zeros(len(own), np.int64),
+            numbers[own, 7],
+        )
+        for token, own in rows.items()
+    }
+
+
+def _check_box(line: str, row: Floats) -> None:
+    is_near = (np.abs(row[:6]) <= FARTHEST_M).all() and (row[3:6] > 0).all()
+    if not (is_near and abs(row[6]) <= FULL_TURN and 0 <= row[7] <= 1):
+        raise InvalidInput(
+            f"{line}: must be metres with sizes above 0, a yaw in radians within a full turn and a "
+            f"score from 0 to 1, got {shown(row.tolist())}"
+        )
 
 
 def _detections(path: Path, token: str, rows: list[Any], sensor: Frame) -> Detections:

@@ -91,7 +91,7 @@ def ideas_table(whole: BudgetResult, without: Mapping[str, BudgetResult]) -> Tab
     ]
     name = whole.entry.name
     return Table(
-        f"Ideas of {name}: B90 without each, {worlds_of(whole)}, {whole.detector}",
+        f"Ideas of {name}: B90 without each, {worlds_of(whole)}, {whole.detector_name}",
         ("policy", "B90", "held back by", f"times {name}", *whole.parts),
         tuple(rows),
         (f"{NOTE} Parts hold the ratio too. Bold ratios exclude 1.",),
@@ -123,7 +123,7 @@ def _table(
         )
     last = () if yardstick is None else (f"times {YARDSTICK}",)
     return Table(
-        f"How few cells are enough: B90, {worlds_of(results[0])}, {results[0].detector}",
+        f"How few cells are enough: B90, {worlds_of(results[0])}, {results[0].detector_name}",
         ("rank", "policy", "B90", *columns, *last, *(("ms",) if is_timed else ())),
         tuple(rows),
         (*_notes(results, is_timed, rows), *tag_notes(each.tags for each in results)),

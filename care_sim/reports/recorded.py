@@ -29,7 +29,7 @@ def sources_table(results: Sequence[BudgetResult]) -> Table:
     ]
     told = (reachable(source, own, "drive") for source, own in _by_source(ordered[0]).items())
     return Table(
-        f"B90 on recorded drives by source, {ordered[0].detector}",
+        f"B90 on recorded drives by source, {ordered[0].detector_name}",
         ("policy", "all", *_by_source(ordered[0])),
         tuple(rows),
         (_NOTE, *told, *least_notes(rows), *tag_notes(one.tags for one in ordered)),

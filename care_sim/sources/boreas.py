@@ -67,17 +67,12 @@ class Boreas(Recordings):
             times[keyframes].tolist(),
             [_car(drive["poses"][frame]) for frame in keyframes],
             [_boxes(drive, frame) for frame in keyframes],
-            self.setup,
+            self.sensor,
         )
 
     def files(self, scene: str) -> list[Path]:
         """The file in the package."""
         return [self.folder / BOREAS_FILE]
-
-    @property
-    def setup(self) -> str | SensorSetup:
-        """The sensor."""
-        return self.sensor
 
 
 def _lidar(pose: Floats) -> Frame:

@@ -34,6 +34,7 @@ from care_sim.sources.film_checks import (
     LEAST_KEYFRAMES,
     MAP_M,
     SIZES_M,
+    STAMPS_NS,
     ValueRange,
     check_film,
     check_span,
@@ -46,6 +47,10 @@ SPAN_S = 0.5
 """Span of earlier poses that count: a keyframe. At 10 Hz these are six poses, which average out the
 centimetres of error of recorded poses. Longer spans lag behind a driver who begins to brake.
 """
+TIMES_S: ValueRange = (-1e8, STAMPS_NS[1] / 1e9)
+"""Seconds of a keyframe, until 2116. Milliseconds since 1970 are larger."""
+STAMP_S = 1e8
+"""From so large a first time on, times are rounded to microseconds after it."""
 LEAST_POSES = 3
 """The fewest poses that give a steady acceleration without lag. At 2 Hz they reach back a
 second.
@@ -176,7 +181,8 @@ def film_of_boxes(
     All poses are x, y, z (metres) and yaw (radians, from x towards y) in one world frame, z up.
     Poses of the car may go on with its roll and its pitch (`care_sim.core.frames.Frame`).
 
-    - `times_s` (k,): seconds at the keyframes, ascending, about evenly apart.
+    - `times_s` (k,): seconds at the keyframes, ascending, about evenly apart, from any moment on,
+      such as 1970.
     - `ego_poses` (k, 4) or (k, 6): the pose of the car at each keyframe: the point on the road
       below its middle, x ahead, y to its left.
     - `boxes`: per keyframe a list of maps. `id` names an object throughout the film. `class` is one
@@ -189,7 +195,10 @@ def film_of_boxes(
     Raises InvalidInput with scene, time and object for what no drive holds.
     """
     setup = sensor_setup(sensor)
-    times = _numbers(f"{name}: times_s", times_s, (-1,), MAP_M)
+    times = _numbers(f"{name}: times_s (seconds)", times_s, (-1,), TIMES_S)
+    # A float holds a time since 1970 to 0.2 us only. Keyframes 0.5 s apart stay 0.5 s apart.
+    if len(times) and times[0] >= STAMP_S:
+        times = np.round(times - times[0], 6)
     tilted = as_array(f"{name}: ego_poses", ego_poses).shape[1:] == (6,)
     poses = _numbers(f"{name}: ego_poses", ego_poses, (-1, 6 if tilted else 4), MAP_M)
     _check_list(name, boxes)
@@ -252,7 +261,7 @@ def _body(
     named = f"{place}: object {shown(box['id'])}"
     if label is not None:
         check_known(f"class of {named}", label, CLASSES)
-    if not isinstance(box["id"], str | int):
+    if not isinstance(box["id"], str | int | np.integer):
         raise InvalidInput(f"{named}: id must be a text or a whole number")
     length, width, height = _numbers(f"{named}: size", box["size"], (3,), SIZES_M).tolist()
     pose = _numbers(f"{named}: pose", box["pose"], (4,), MAP_M)

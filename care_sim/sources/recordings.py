@@ -48,8 +48,9 @@ class Recordings(ABC):
 
     @property
     def setup(self) -> str | SensorSetup:
-        """The set-up, its name or its file, whose grid the films hold."""
-        return DEFAULT_SETUP
+        """The set-up, its name or its file, whose grid the films hold: that of a field `sensor`."""
+        sensor: str | SensorSetup = getattr(self, "sensor", DEFAULT_SETUP)
+        return sensor
 
     def columns(self) -> dict[str, Any]:
         """Return the columns of a row for unusual options of reading."""

@@ -104,6 +104,29 @@ def test_drives_and_tests_count_collisions_and_needless_stops(
     assert len(result.counts) == 2
 
 
+def test_a_detector_has_parameters_in_the_result_and_no_published_entry_beside_it(
+    capsys, here, one_street
+):
+    (here / "recall.csv").write_text("returns,recall\n400,1\n")
+    words = "benchmark", "--policy", "boxes", "--quick", "--workers", 1, "--detector", "graded"
+    given = "--detector-parameters", "file=recall.csv"
+    code, out, _ = run(capsys, *words, *given)
+    assert (code, "B90, 1 world (streets), graded (file=recall.csv)" in out) == (0, True)
+    path = here / "runs/benchmark/boxes.graded-file=recall.csv.quick.json"
+    few = read_result(path)
+    assert few.detector_parameters == (("file", "recall.csv"),)
+    code, out, _ = run(capsys, "leaderboard", "--verify", path)
+    assert (code, "1 world of 1, drawn by lot, agree" in out) == (0, True)
+
+    # Another content of the file plays again.
+    (here / "recall.csv").write_text("returns,recall\n1,1\n")
+    assert run(capsys, *words, *given)[0] == 0
+    many = read_result(path)
+    assert many.rows[0].full[2] > 2 * few.rows[0].full[2] > 0
+    code, _, err = run(capsys, *words, "--detector-parameters", "file=none.csv")
+    assert (code, "none.csv: no CSV table" in err) == (2, True)
+
+
 def test_recorded_drives_are_a_part_of_their_own(capsys, here, monkeypatch, tmp_path):
     monkeypatch.setattr(result_files, "_REFERENCES", tmp_path / "references")
     drives = ["kitti/0000", "kitti/0004"]

@@ -29,6 +29,7 @@ def test_every_set_of_worlds_and_every_detector_has_its_table(capsys, here):
         "whole": {},
         "trial": {"quick": True, "streets": 24},
         "other": {"detector": "megvii"},
+        "own": {"detector_parameters": (("worth", 2),)},
         "sealed": {"sealed": "5" * 64, "first": 0},
         "fresh": {"first": 2**31},
     }.items():
@@ -40,6 +41,7 @@ def test_every_set_of_worlds_and_every_detector_has_its_table(capsys, here):
         "80 worlds (streets), centerpoint",
         "24 worlds (streets), centerpoint",
         "80 worlds (streets), megvii",
+        "80 worlds (streets), centerpoint (worth=2)",
         "80 worlds sealed by 555555555555, centerpoint",
         "80 fresh worlds (streets), centerpoint",
     }

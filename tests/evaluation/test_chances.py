@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from care_sim.core.types import CLASSES
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.evaluation.chances import Chances
 from care_sim.evaluation.counts import KEPT, expected_columns, scene_counts
@@ -85,6 +86,21 @@ def test_the_graded_proxy_detects_where_its_luck_is_below_the_chance():
     """Luck follows from the place, so that all seeds have one, and more cells never lose."""
     with FilmEnv(handmade_film(), detector="graded", floor=False) as env:
         found, chances = played(env, "graded", {}, 0)
+    assert found[chances == 1].all()
+    assert not found[chances == 0].any()
+
+
+def test_chances_follow_the_curve_of_a_file(tmp_path):
+    """Four cells of every object return."""
+    path = tmp_path / "recall.csv"
+    path.write_text("class,returns,recall\npedestrian,1,0.5\npedestrian,16,0.7\nbus,5,1\ncar,4,1\n")
+    given = {"file": str(path)}
+    with FilmEnv(handmade_film(), detector="graded", detector_parameters=given, floor=False) as env:
+        found, chances = played(env, "graded", given, 0)
+        events = env.score.sightings
+    labels = events.frames.classes[events.events]
+    expected = {"pedestrian": 0.6, "bus": 0.0, "car": 1.0}
+    assert chances.tolist() == pytest.approx([expected[CLASSES[label]] for label in labels])
     assert found[chances == 1].all()
     assert not found[chances == 0].any()
 

@@ -5,10 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from care_sim.base.errors import InvalidInput
 from care_sim.core.types import CLASSES
 from care_sim.perception.detectors import make_detector
 from care_sim.perception.matching import found_objects
-from care_sim.perception.proxy import GradedProxy, ReturnsRule, chance, count_hits
+from care_sim.perception.proxy import GradedProxy, ReturnsRule, chance, count_hits, read_curves
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud
 from care_sim.sources.street_films import street_film
 
@@ -113,3 +114,64 @@ def test_the_curves_are_those_of_the_cluster_detector():
                 found[group].append(matched[row])
     for group, shares in expected.items():
         assert np.mean(found[group]) == pytest.approx(np.mean(shares), abs=0.1)
+
+
+def curve_file(tmp_path, *lines):
+    path = tmp_path / "recall.csv"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("kind", "returns", "expected"),
+    [
+        # No returns are never detected, nor are fewer than the first row has.
+        ("car", 0, 0.0),
+        ("car", 1, 0.2),
+        ("car", 2, 0.4),  # half of the way from 1 to 4, in the logarithm
+        ("car", 4, 0.6),
+        ("car", 400, 0.6),
+        ("pedestrian", 7, 0.0),
+        ("pedestrian", 8, 1.0),
+        ("bus", 400, 0.0),
+    ],
+)
+def test_a_file_sets_the_curves(tmp_path, kind, returns, expected):
+    path = curve_file(tmp_path, "recall,class,returns", "0.2,car,1", "1,pedestrian,8", "0.6,car,4")
+    present = crowd(4000, kind)
+    detector = make_detector("graded", 1.84, file=str(path))
+    _, objects = detector.detect(cloud(np.repeat(present.objects, returns)), present)
+    assert len(objects) / len(present) == pytest.approx(expected, abs=0.03 * (0 < expected < 1))
+
+
+def test_without_classes_a_curve_is_for_all(tmp_path):
+    curves = read_curves(curve_file(tmp_path, "returns,recall", "1.5,0.25", "3,0.5"))
+    assert curves == dict.fromkeys(CLASSES, ([1.5, 3.0], [0.25, 0.5]))
+
+
+@pytest.mark.parametrize(
+    ("lines", "fault"),
+    [
+        (["distance,recall", "5,0.2"], "recall.csv: must have one column returns, has distance, r"),
+        (["returns,recall", "5,80"], r"recall of car must lie in \[0, 1\], got \[80.0\]"),
+        (["returns,recall", "5,"], r"recall of car must lie in \[0, 1\], got \[nan\]"),
+        (["returns,recall", "5,much"], "the column recall must hold numbers"),
+        (["returns,recall", "0,0.2"], r"returns of car must ascend from 1 or more, got \[0.0\]"),
+        (["returns,recall", "5,0.2", "5,0.3"], "must ascend from 1 or more"),
+        (["returns,recall", ",0.2"], "must ascend from 1 or more"),
+        (["returns,recall"], r"must ascend from 1 or more, got \[\]"),
+        (["class,returns,recall", "Car,5,0.2"], "unknown class in .*recall.csv 'Car'; .*is car"),
+        (["class,returns,recall", "5,0.2"], "no CSV table"),
+    ],
+)
+def test_a_wrong_file_of_curves_is_named_in_one_line(tmp_path, lines, fault):
+    with pytest.raises(InvalidInput, match=fault) as refused:
+        make_detector("graded", 1.84, file=str(curve_file(tmp_path, *lines)))
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("file", ["none.csv", 5])
+def test_a_missing_file_of_curves_is_named(tmp_path, monkeypatch, file):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InvalidInput, match=r"none\.csv: no CSV table|file must be"):
+        make_detector("graded", 1.84, file=file)

@@ -12,6 +12,7 @@ from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.sources.box_films import motions
 from care_sim.sources.film_checks import check_film
 from care_sim.sources.named import source_of
+from care_sim.study.scene_play import film_hash
 from tests.helpers.av2_log import CAR_AHEAD, box, parked
 
 TIMES = np.array([0.0, 0.5, 1.0, 1.6, 2.0, 2.5])
@@ -237,3 +238,32 @@ def test_what_is_told_wrong_is_named(name):
     changes, message = TOLD_WRONG[name]
     with pytest.raises(InvalidInput, match=message):
         care_sim.film_of_boxes(**told(**changes))
+
+
+@pytest.mark.parametrize("step", [0.1, 0.5, 0.0625])
+def test_times_since_1970_give_the_film_of_times_from_the_start(step):
+    """A float holds them to 0.2 us, and the film has whole microseconds."""
+    stamps = [1_700_000_000.3 + step * k for k in range(6)]
+    stamped = care_sim.film_of_boxes(**told(times_s=stamps))
+    plain = care_sim.film_of_boxes(**told(times_s=[round(step * k, 6) for k in range(6)]))
+    assert stamped.keyframe_s == plain.keyframe_s
+    assert film_hash(stamped) == film_hash(plain)
+
+
+def test_an_id_of_numpy_is_a_number():
+    given = told()
+    numbers = [[one | {"id": n} for n, one in enumerate(boxes)] for boxes in given["boxes"]]
+    numpy = [[one | {"id": np.int32(one["id"])} for one in boxes] for boxes in numbers]
+    ours, theirs = (
+        care_sim.film_of_boxes(**given | {"boxes": boxes}) for boxes in (numbers, numpy)
+    )
+    assert film_hash(ours) == film_hash(theirs)
+
+
+@pytest.mark.parametrize("unit", [1e3, 1e9])
+def test_other_units_since_1970_are_refused(unit):
+    times = [unit * (1.7e9 + 0.5 * k) for k in range(6)]
+    with pytest.raises(
+        InvalidInput, match=r"mine: times_s \(seconds\) must lie in \[-1e\+08, 4\.6.*e\+09\]"
+    ):
+        care_sim.film_of_boxes(**told(times_s=times))

@@ -77,6 +77,11 @@ def test_the_documented_source_of_boxes_plays_from_fifteen_lines(tmp_path, monke
     (row,) = read_results(tmp_path / "out")[0]
     assert (row["source"], row["scene"], row["keyframes"]) == ("mine:Mine", "monday", 8)
     assert row["events"] == 1.0
+    # Its field `sensor` is an option, the grid of its films and a column of its rows.
+    mounted = source_of("mine:Mine:drives", sensor="os1-64")
+    (scene,) = mounted.scenes()
+    assert len(mounted.film(scene).grid.elevations) == 64
+    assert mounted.row(scene)["sensor"] == "os1-64"
 
 
 def test_recordings_are_asked_for_with_their_folder_and_options(installed, drive):

@@ -49,7 +49,9 @@ def refusal(path):
 @pytest.mark.parametrize("curve", [ALWAYS, HALF_WAY, NEVER])
 def test_a_file_holds_all_of_a_result(tmp_path, curve):
     entry = Entry("care-sector", (("residual", False),), "core-spread", "Ours")
-    result = made_budgets(entry, HALF_WAY, curve, policy_ms=(0.5, 1.25))
+    looking = (("file", "recall.csv"), ("levels", (1, 2)))
+    given_ = {"policy_ms": (0.5, 1.25), "detector_parameters": looking}
+    result = made_budgets(entry, HALF_WAY, curve, **given_)
     result.write(tmp_path / "mine.json")
     again = read_result(tmp_path / "mine.json")
     assert again == result
@@ -170,6 +172,7 @@ def test_published_entries_stand_beside_results_of_the_same_worlds(tmp_path, mon
     worse = made_budgets("care", NEVER)
     assert with_references([worse]) == [worse, wide]
     assert len(with_references([replace(mine, sealed="5" * 64)])) == 1
+    assert len(with_references([replace(mine, detector_parameters=(("worth", 2),))])) == 1
 
 
 def test_published_entries_are_parsed_once(tmp_path, monkeypatch):

@@ -43,3 +43,6 @@ def test_columns_of_a_newer_version_are_named(tmp_path):
     )
     assert read_results(foggy)[2] == [told]
     assert merged([foggy, foggy]).left_out == [told]
+    # The benchmark reads these.
+    expected = folder(tmp_path / "two", [each | {"expected/emerging": 0.5} for each in ROWS])
+    assert read_results(expected)[2] == []

@@ -56,6 +56,8 @@ class Benchmark(WorkerOptions):
     """The detector. Entries are ranked under centerpoint, and only its results are printed beside
     published entries. `results/b90.md` lists B90 on streets under megvii, pointrcnn and returns,
     too."""
+    detector_parameters: tuple[str, ...] = ()
+    """Parameters of the detector as NAME=VALUE. Published entries have none."""
     closed_loop: Flag = False
     """Play 24 drives, 40 Euro NCAP tests and 80 tight tests too, which a full scan only just
     passes. Collisions avoided and needless stops then count as well."""

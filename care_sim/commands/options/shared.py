@@ -57,12 +57,13 @@ class DetectorOptions:
     """Which detector looks at the points."""
 
     detector: str = "returns"
-    """Built in: returns (the paper's proxy), graded (confidence grows with returns), centerpoint,
-    megvii and pointrcnn (measured on real data), cluster (a real one), pillars (a learned one),
-    torchscript. Otherwise the name of an installed detector, or MODULE:CLASS.
+    """Built in: returns (the paper's proxy), graded (recall from a file), recorded (boxes from a
+    file), centerpoint, megvii and pointrcnn (measured), cluster (a real one), pillars (a learned
+    one), torchscript. Otherwise the name of an installed detector, or MODULE:CLASS.
     """
     detector_parameters: tuple[str, ...] = ()
-    """Parameters of the detector as NAME=VALUE, for example file=model.pt for torchscript."""
+    """Parameters of the detector as NAME=VALUE, for example file=model.pt for torchscript,
+    file=recall.csv for graded."""
 
 
 @dataclass(frozen=True, kw_only=True)

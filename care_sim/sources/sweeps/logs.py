@@ -11,8 +11,9 @@ from scipy.spatial.transform import Rotation, Slerp
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame
+from care_sim.perception.csv_tables import columns_of, read_csv
 from care_sim.sources.film_checks import FULL_TURN, MAP_M, check_span, quaternion_fault
-from care_sim.sources.sweeps.points import READERS, columns_of, in_seconds, read_csv, read_sweep
+from care_sim.sources.sweeps.points import READERS, in_seconds, read_sweep
 
 SWEEPS_KEYFRAME_S = 0.5
 """Keyframes are as far apart as those of nuScenes."""

@@ -1,19 +1,16 @@
-"""Points of one sweep, from a PCD, NPY, CSV or BIN file; CSV tables of numbers, and times in one of
-the usual units.
-"""
+"""Points of one sweep, from a PCD, NPY, CSV or BIN file, and times in one of the usual units."""
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow
-from pyarrow import csv
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
+from care_sim.perception.csv_tables import columns_of, read_csv
 from care_sim.sources.film_checks import REACH_M
 from care_sim.sources.nuscenes.sweeps import FULL_INTENSITY, MOST_SWEEP_BYTES, RINGS
 
@@ -21,36 +18,6 @@ UNITS_S = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3))
 """Times from so large a number on are counts of nanoseconds, microseconds, milliseconds since 1970;
 smaller ones are seconds.
 """
-
-
-def read_csv(path: Path, headless: bool = False) -> Any:
-    """Return a CSV file as an Arrow table; without a heading its columns are f0, f1, and so on.
-
-    Raises InvalidInput for a file that is missing or no table.
-    """
-    options = csv.ReadOptions(autogenerate_column_names=headless, use_threads=False)
-    try:
-        return csv.read_csv(path, read_options=options)
-    except (OSError, ValueError, pyarrow.ArrowException) as error:
-        told = " ".join(str(error).split())[:200]
-        raise InvalidInput(f"{path}: no CSV table ({told})") from error
-
-
-def columns_of(path: Path, table: Any, names: Sequence[str]) -> Floats:
-    """Return (n, k) the named columns as numbers; an empty cell is NaN.
-
-    Raises InvalidInput for a column that is missing, there twice, or holds text.
-    """
-    columns = []
-    for name in names:
-        if table.column_names.count(name) != 1:
-            known = ", ".join(table.column_names)[:200]
-            raise InvalidInput(f"{path}: must have one column {name}, has {known}")
-        try:
-            columns.append(table[name].cast(pyarrow.float64(), safe=False).to_numpy())
-        except (ValueError, pyarrow.ArrowException) as error:
-            raise InvalidInput(f"{path}: the column {name} must hold numbers") from error
-    return np.column_stack(columns)
 
 
 def in_seconds(times: Floats) -> Floats:

@@ -43,6 +43,7 @@ from care_sim.study.benchmark.suite import (
     configurations,
     episode_seeds,
 )
+from care_sim.study.rows.parameters import Parameters
 from care_sim.study.rows.reading import is_avoided, stops_for_nothing
 from care_sim.study.run_config import FULL, Row, RunConfig
 from care_sim.study.scene_play import DECISION_MS
@@ -109,6 +110,13 @@ class BudgetResult:
     made_by: Mapping[str, Any]
     sealed: str | None = None
     policy_ms: tuple[float, ...] = ()
+    detector_parameters: Parameters = ()
+
+    @property
+    def detector_name(self) -> str:
+        """The detector with its parameters."""
+        given = ", ".join(f"{name}={value}" for name, value in self.detector_parameters)
+        return f"{self.detector} ({given})" if given else self.detector
 
     @property
     def worlds(self) -> tuple[tuple[str, int | str], ...]:
@@ -177,6 +185,7 @@ class BudgetResult:
             **asdict(self.entry),
             "tags": self.tags,
             "detector": self.detector,
+            "detector_parameters": self.detector_parameters,
             "quick": self.quick,
             "sealed": self.sealed,
             "policy_ms": self.policy_ms,
@@ -224,12 +233,20 @@ def budget_worlds(
 
 
 def budget_tasks(
-    entry: Entry, part: str, worlds: Sequence[Any], detector: str
+    entry: Entry,
+    part: str,
+    worlds: Sequence[Any],
+    detector: str,
+    detector_parameters: Parameters = (),
 ) -> list[list[RunConfig]]:
     """Return per world the full scan and the entry at every budget. Raises InvalidInput for an
     entry or a detector that cannot be played.
     """
-    common: dict[str, Any] = {"detector": detector, "camera_profile": KITTI_CAMERA}
+    common: dict[str, Any] = {
+        "detector": detector,
+        "detector_parameters": detector_parameters,
+        "camera_profile": KITTI_CAMERA,
+    }
     # Films have a picture every 0.5 s and none that is 0.12 s old.
     common |= {} if part in FILMED else LATE
     plays = drive_plays if part in RECORDED_PARTS else partial(configurations, part)
@@ -245,6 +262,7 @@ def play_budgets(
     worlds: Worlds,
     quick: bool = False,
     salt: Salt | None = None,
+    detector_parameters: Parameters = (),
 ) -> list[BudgetResult]:
     """Play the entries; return the results of those that finished every play, in their order. With
     a `salt` the worlds are numbers, whose seeds the salt draws.
@@ -262,7 +280,7 @@ def play_budgets(
         entry: [
             task
             for part, own in played.items()
-            for task in budget_tasks(entry, part, own, detector)
+            for task in budget_tasks(entry, part, own, detector, detector_parameters)
         ]
         for entry in entries
     }
@@ -285,6 +303,7 @@ def play_budgets(
                     _policy_ms(
                         [own for (part, _), own in zip(named, rows, strict=True) if part == STREETS]
                     ),
+                    detector_parameters,
                 )
             )
     return results

@@ -61,14 +61,22 @@ def replayed(
         if part in RECORDED_PARTS and world not in at_hand:
             raise InvalidInput(f"it plays {world}: give --recorded the sources of its drives")
     # A policy that cannot be loaded here has its line before anything is played.
-    budget_tasks(result.entry, STREETS, [FIRST_SEED], result.detector)[0][-1].try_out()
+    looking = result.detector, result.detector_parameters
+    budget_tasks(result.entry, STREETS, [FIRST_SEED], *looking)[0][-1].try_out()
     worlds: dict[str, list[Any]] = {}
     for part in result.parts:
         own = [world for of, world in result.worlds if of == part]
         count = min(max(-(-len(own) // ONE_IN), LEAST_WORLDS), len(own))
         drawn = sorted(rng.sample(own, count), key=own.index)
         worlds[part] = [at_hand.get(str(world), world) for world in drawn]
-    found = play_budgets([result.entry], player, result.detector, worlds, salt=salt)
+    found = play_budgets(
+        [result.entry],
+        player,
+        result.detector,
+        worlds,
+        salt=salt,
+        detector_parameters=result.detector_parameters,
+    )
     if player.failures:
         raise InvalidInput(str(player.failures[0]))
     (again,) = found

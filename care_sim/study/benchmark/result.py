@@ -94,12 +94,15 @@ def _parsed(content: Mapping[str, Any]) -> BudgetResult:
     """Return the result. Raises KeyError, TypeError, ValueError or InvalidInput where damaged."""
     if content["columns"] != list(BudgetRow._fields) or content["budgets"] != list(BUDGETS):
         raise ValueError(f"its budgets must be {BUDGETS}, its columns {BudgetRow._fields}")
-    given = with_tuples({"given": content["parameters"]})["given"]
+    given, looking = (
+        tuple((str(name), value) for name, value in with_tuples({"given": pairs})["given"])
+        for pairs in (content["parameters"], content.get("detector_parameters", []))
+    )
     texts = content["policy"], content["cell_order"], content["label"], content["detector"]
     if not all(isinstance(text, str) for text in texts):
         raise ValueError("policy, cell_order, label and detector must be texts")
     policy, order, label, detector = texts
-    entry = Entry(policy, tuple((str(name), value) for name, value in given), order, label)
+    entry = Entry(policy, given, order, label)
     entry.check()
     rows = tuple(_row(*values) for values in content["rows"])
     counts = content["counts"]
@@ -118,6 +121,7 @@ def _parsed(content: Mapping[str, Any]) -> BudgetResult:
         dict(content["made_by"]),
         None if sealed is None else str(sealed),
         tuple(map(float, content.get("policy_ms", ()))),
+        looking,
     )
     # The shapes and numbers of rows are checked where their counts are made.
     if not result.counts:
@@ -218,7 +222,9 @@ def with_references(results: Sequence[BudgetResult]) -> list[BudgetResult]:
     reached other counts than the published entry of its name stands beside it.
     """
     own = [(result.entry, result.rows) for result in results]
-    published = [] if results[0].sealed else references(results[0].detector, results[0].worlds)
+    first = results[0]
+    is_alone = first.sealed or first.detector_parameters
+    published = [] if is_alone else references(first.detector, first.worlds)
     return [*results, *(each for each in published if (each.entry, each.rows) not in own)]
 
 

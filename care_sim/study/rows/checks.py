@@ -21,6 +21,8 @@ USUAL = DEFAULTS | {"presence": ANNOTATED}
 """Defaults of parameters that rows of older versions lack."""
 Task = frozenset[tuple[str, Any]]
 """The parameters of a task that are not the default, by name."""
+_UNREAD = ("drawn.", "expected/")
+"""First letters of columns that only other commands read."""
 _LABEL_NAMES = ("scene", "scenario", "policy", "budget")
 _LABEL_SEEDS = ("seed", "floor_seed")
 _MAY_DIFFER = {
@@ -102,7 +104,7 @@ class RowChecks:
     def unknown(self, columns: Sequence[str], schema: Schema) -> list[str]:
         """Return a line if tables leave out unknown `columns`."""
         known = {*schema.known(columns), *UNREAD}
-        names = [name for name in columns if name not in known and not name.startswith("drawn.")]
+        names = [name for name in columns if name not in known and not name.startswith(_UNREAD)]
         if not names:
             return []
         versions = sorted({row.get("version") or "unknown" for _, row in self._rows.values()})
