@@ -95,7 +95,7 @@ def test_drives_and_tests_count_collisions_and_needless_stops(
     words = "--quick", "--closed-loop", "--workers", 1, "--detector", "returns"
     code, out, _ = run(capsys, "benchmark", "--policy", "boxes", *words)
     assert (code, "B90, 2 worlds (streets 1, tests 1), returns" in out) == (0, True)
-    # Published entries play streets alone.
+    # No published entry has played these tests beside streets.
     assert "care-sector" not in out
     result = read_result(here / "runs" / "benchmark" / "boxes.returns.quick.closed-loop.json")
     street, test = result.rows

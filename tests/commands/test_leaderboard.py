@@ -45,9 +45,9 @@ def test_every_set_of_worlds_and_every_detector_has_its_table(capsys, here):
         "80 worlds sealed by 555555555555, centerpoint",
         "80 fresh worlds (streets), centerpoint",
     }
-    # Published entries are of published streets and one detector.
+    # Published entries are of published streets, under detectors as they are shipped.
     page = (here / "runs" / "leaderboard" / "leaderboard.md").read_text()
-    assert page.count("| care-sightlines |") == 2
+    assert page.count("| care-sightlines |") == 3
     assert page.count("A trial") == 1
     for n, title in enumerate(titles):
         figure = f"leaderboard-{n}.svg" if n else "leaderboard.svg"
