@@ -16,6 +16,7 @@ from care_sim.evaluation.smallest_budget import (
     budget_ratio,
     names_of,
     reaching,
+    resampled_budgets,
     shares,
     smallest_budget,
 )
@@ -67,6 +68,14 @@ def test_every_object_weighs_alike():
     score = smallest_budget([part])
     # Half of the draws have one world of each, a quarter the second one alone.
     assert (score.budget, score.low, score.high) == (0.005, 0.005, math.inf)
+
+
+def test_every_part_draws_worlds_of_its_own():
+    """Two worlds as above are enough in three of four draws, two such parts in 9 of 16."""
+    got = np.array([np.full((7, 1), 9.0), np.zeros((7, 1))])
+    part = PartCounts(("kept",), got, np.array([[9.0], [1.0]]))
+    for parts, enough in (([part], 3 / 4), ([part, part], 9 / 16)):
+        assert np.isfinite(resampled_budgets(parts)).mean() == pytest.approx(enough, abs=0.02)
 
 
 def test_needless_stops_may_be_five_in_a_hundred_more():

@@ -77,14 +77,30 @@ def test_results_without_a_rank_stand_below_all_others():
 
 
 def test_entries_whose_paired_ratio_includes_1_share_ranks():
-    """In every second street one is ahead, in the others the other one; both are behind a third."""
-    late = made_budgets("care", (0.1, 0.2, 0.3, 0.8, 1.0, 1.0, 1.0), streets=20)
-    early = made_budgets("boxes", HALF_WAY, streets=20)
+    """One is ahead in 11 streets, the other one in 10, so that their B90 differ, but could be the
+    other way round. Both are behind a third.
+    """
+    late = made_budgets("care", (0.1, 0.2, 0.3, 0.8, 1.0, 1.0, 1.0), streets=21)
+    early = made_budgets("boxes", HALF_WAY, streets=21)
     pairs = list(zip(early.rows, late.rows, strict=True))
     rows = [tuple(pair[(n + k) % 2] for n, pair in enumerate(pairs)) for k in (0, 1)]
     tied = [replace(early, rows=rows[0]), replace(late, rows=rows[1])]
-    table = budgets_table([*tied, made_budgets("place", ALWAYS, streets=20)])
+    assert tied[0].score.budget < tied[1].score.budget
+    table = budgets_table([*tied, made_budgets("place", ALWAYS, streets=21)])
     assert [row[0] for row in table.rows] == ["1", "2-3", "2-3"]
+
+
+def test_entries_whose_intervals_overlap_have_ranks_where_one_is_always_ahead():
+    """Every second street is easy. On each street, one entry has 98% of what the other one has."""
+    hard, easy = (0.0, 0.0, 0.1, 0.5, 0.9, 1.0, 1.0), (0.5, 0.8, 0.9, 1.0, 1.0, 1.0, 1.0)
+    ahead, behind = (
+        [made_budgets(name, [share * own for own in curve], streets=20) for curve in (hard, easy)]
+        for name, share in (("care", 1.0), ("boxes", 0.98))
+    )
+    mixed = [replace(one, rows=one.rows[::2] + other.rows[1::2]) for one, other in (behind, ahead)]
+    table = budgets_table(mixed)
+    assert [row[:2] for row in table.rows] == [("1", "care"), ("2", "boxes")]
+    assert mixed[1].score.high > mixed[0].score.low
 
 
 def test_times_and_names_tell_entries_apart():

@@ -9,12 +9,13 @@ from care_sim.base.errors import InvalidInput
 from care_sim.base.seeds import split_of
 from care_sim.evaluation.smallest_budget import BUDGETS
 from care_sim.study.benchmark import result as result_files
-from care_sim.study.benchmark.budgets import budget_tasks, budget_worlds, counts_of
+from care_sim.study.benchmark.budgets import budget_tasks, budget_worlds, counts_of, play_budgets
+from care_sim.study.benchmark.maker import made_by
 from care_sim.study.benchmark.recorded import AHEAD, RECORDED, recorded_drives
 from care_sim.study.benchmark.result import read_result
 from care_sim.study.benchmark.suite import DRIVES, STREETS, TESTS, TIGHT_TESTS, Entry
 from tests.helpers import kitti_drive
-from tests.helpers.made_budgets import ALWAYS, HALF_WAY, NEVER, made_budgets
+from tests.helpers.made_budgets import ALWAYS, HALF_WAY, NEVER, made_budgets, made_plays
 
 
 def test_streets_are_test_seeds_and_a_trial_plays_the_first_of_them():
@@ -117,6 +118,19 @@ def test_entries_share_the_full_scan():
         budget_tasks(Entry(name), STREETS, [200], "centerpoint")[0] for name in ("care", "boxes")
     )
     assert one == other
+
+
+@pytest.mark.parametrize("quick", [True, False])
+def test_a_result_holds_the_counts_and_the_times_of_its_plays(tmp_path, quick):
+    """The median of 1 to 7 ms is 4. The full scan's 99 ms and the tests have no part in it."""
+    worlds = {STREETS: [200, 201, 202], TESTS: budget_worlds(closed_loop=True)[TESTS][:1]}
+    entry = Entry("care")
+    with made_plays(tmp_path) as player:
+        (result,) = play_budgets([entry], player, "centerpoint", worlds, quick)
+    given = {"quick": quick, "policy_ms": (4.0, 40.0), "made_by": made_by(entry)}
+    assert result.of_part(STREETS) == made_budgets(entry, HALF_WAY, streets=3, **given)
+    (test,) = result.of_part(TESTS).rows
+    assert (test.full, test.got) == ((1.0, 0.0), ((0.0, 0.0),) * len(BUDGETS))
 
 
 def test_the_counts_of_an_episode():
