@@ -11,14 +11,14 @@ from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import Belief
 from care_sim.core.cells.sets import CellSets
 from care_sim.core.defaults import AS_DEMANDED
-from care_sim.core.residual import explained, ray_starts, wedge_rays, wedges
+from care_sim.core.residual import explained, wedges
 from care_sim.core.rig import Rig
-from care_sim.core.types import CLASSES, Demand, Ego, ImageDetections
+from care_sim.core.types import Demand, Ego
 from care_sim.policies.base import Policy
 from care_sim.policies.controls.patterns import cells_by_row, entry_cells
+from care_sim.policies.own.box_places import ON_FOOT, box_places
 from care_sim.policies.own.care import CORE_FIRST
 from care_sim.policies.own.sight_lines import columns_ahead
-from care_sim.world.bodies import CATALOGUE
 
 FRONT_RAD = math.radians(60)
 """Half of the front that is watched. Four in five emerging newcomers without a camera box appear
@@ -41,10 +41,8 @@ ROW_WEIGHT = 4.5
 MATCH_M, MATCH_SHARE = 3.0, 0.3
 """Two boxes can show one object if their places differ by less than this, or by less than this
 share of the range. The larger bound holds, because a range by the height of a box is rough."""
-_HEIGHTS_M = np.array([CATALOGUE[name].size[2] for name in CLASSES])
 Pictured = tuple[Floats, Mask]
 """Content of the boxes of a picture: places (n, 2) in metres, and whether each is on foot."""
-_ON_FOOT = np.isin(CLASSES, ("pedestrian", "bicycle"))
 
 
 class CareAimed(Policy):
@@ -57,9 +55,9 @@ class CareAimed(Policy):
     the first, as wide; the rest of the first row; the pattern `rows`. Each set begins in its
     middle, a little above half its height, unless the rig has a cell order.
 
-    Each idea can be switched off, to measure its worth: `residual` (every box counts as
-    unexplained), `tracks` (no hulls), `aim` (else the core first, spread), `new` (each unexplained
-    box counts as new), `front` (the rows come late).
+    Each idea can be switched off, to measure its worth. Without `residual`, every box counts as
+    unexplained. Without `new`, each unexplained box counts as new. `tracks` are the hulls, `front`
+    the early rows. Without `aim`, each set begins with its core, spread.
     """
 
     name = "care-aimed"
@@ -130,7 +128,7 @@ class CareAimed(Policy):
 
     def _picture(self, belief: Belief) -> Pictured:
         detections = belief.detections
-        return box_places(detections, self.rig), _ON_FOOT[detections.classes]
+        return box_places(detections, self.rig)[:, :2], ON_FOOT[detections.classes]
 
     def _listed(self, sets: CellSets, most: int) -> CellSets:
         if self._aims and self.rig.cell_order == AS_DEMANDED:
@@ -170,20 +168,6 @@ def _bounds(values: Integers, group: Integers) -> tuple[Integers, Integers]:
     np.minimum.at(least, group, values)
     np.maximum.at(largest, group, values)
     return least[group], largest[group]
-
-
-def box_places(detections: ImageDetections, rig: Rig) -> Floats:
-    """Return the places (n, 2) of what the boxes show, x and y in the sensor frame, in metres. At
-    this range the typical height of the class appears as high as the box.
-    """
-    if not len(detections):
-        return np.empty((0, 2))
-    pixels = np.maximum(detections.boxes[:, 3] - detections.boxes[:, 1], 1.0)
-    focal = rig.camera_models.focals[detections.cameras]
-    depths = focal * _HEIGHTS_M[detections.classes] / pixels
-    places: Floats = depths[:, None] * wedge_rays(detections, rig)[:, 0, :2]
-    starts = ray_starts(detections, rig)
-    return places if starts is None else places + starts[:, :2]
 
 
 def standing_still(places: Floats, ego: Ego, seconds: float) -> Floats:

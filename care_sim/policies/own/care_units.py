@@ -7,18 +7,15 @@ from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import Belief
 from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.grid import Cells
-from care_sim.core.residual import ray_starts, wedge_rays, wedges
+from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
-from care_sim.core.types import CLASSES, Demand, ImageDetections, Tracks
+from care_sim.core.types import Demand, ImageDetections, Tracks
+from care_sim.policies.own.box_places import ON_FOOT, box_places
 from care_sim.policies.own.care import CareSightlines
 from care_sim.sensors.signal import Signal
-from care_sim.world.bodies import CATALOGUE
 
-_HEIGHTS_M = np.array([CATALOGUE[name].size[2] for name in CLASSES])
-"""The typical body of every class; `CATALOGUE` has their sources."""
 PERSON_REFLECTANCE = 0.4
 """Least reflectance of pedestrian targets at 850 to 910 nm (ISO 19206-2: 40 to 60%)."""
-_SHOWS_PERSON = np.isin(CLASSES, ("pedestrian", "bicycle"))
 
 
 class TargetShots:
@@ -35,7 +32,7 @@ class TargetShots:
         self._most = rig.hardware.most_shots
         self._signal = Signal(rig.returns)
         vehicle = rig.returns.lidar_stated_reflectance
-        self._brightness = np.where(_SHOWS_PERSON, PERSON_REFLECTANCE, vehicle)
+        self._brightness = np.where(ON_FOOT, PERSON_REFLECTANCE, vehicle)
 
     def of(self, belief: Belief) -> Integers:
         """Return (N,) the shots of every cell: the maximum over the hulls and wedges that hold it.
@@ -66,19 +63,8 @@ class TargetShots:
 
     def _to_pictured(self, detections: ImageDetections) -> list[Floats]:
         """Return (n,) metres to the objects of image boxes, by their heights, from each LiDAR."""
-        heads = self._rig.grid.heads
-        if not len(detections):
-            return [np.empty(0)] * len(heads)
-        cameras = self._rig.camera_models
-        pixels = detections.boxes[:, 3] - detections.boxes[:, 1]
-        focal = cameras.focals[detections.cameras]
-        depths = focal * _HEIGHTS_M[detections.classes] / np.maximum(pixels, 1.0)
-        # Depth is along the optical axis; the ray through the middle of the box is longer.
-        places = depths[:, None] * wedge_rays(detections, self._rig)[:, 0]
-        starts = ray_starts(detections, self._rig)
-        if starts is not None:
-            places += starts
-        return [np.linalg.norm(head.points(places), axis=1) for head in heads]
+        places = box_places(detections, self._rig)
+        return [np.linalg.norm(head.points(places), axis=1) for head in self._rig.grid.heads]
 
 
 class CareUnits(CareSightlines):

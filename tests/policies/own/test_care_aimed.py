@@ -14,10 +14,10 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.residual import explained, wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego
+from care_sim.policies.own.box_places import box_places
 from care_sim.policies.own.care_aimed import (
     CareAimed,
     aimed,
-    box_places,
     have_counterparts,
     standing_still,
 )
@@ -71,14 +71,14 @@ def test_a_box_shows_something_where_its_height_fits(seen):
     """
     rig = Rig(cameras=(AHEAD, PinholeCamera(yaw=math.pi / 2)))
     person, car = ("pedestrian", 76, 81.2, 84, 98.8), ("car", 155, 85.7, 165, 94.3)
-    assert box_places(seen(person, car), rig) == pytest.approx(np.array([[16, 8], [32, 0]]))
+    assert box_places(seen(person, car), rig) == pytest.approx(np.array([[16, 8, 0], [32, 0, 0]]))
     left = box_places(seen(person, car, camera=1), rig)
-    assert left == pytest.approx(np.array([[-8, 16], [0, 32]]))
+    assert left == pytest.approx(np.array([[-8, 16, 0], [0, 32, 0]]))
     turned = box_places(seen(person, car, yaw_change=math.pi / 2), rig)
-    assert turned == pytest.approx(np.array([[8, -16], [0, -32]]))
+    assert turned == pytest.approx(np.array([[8, -16, 0], [0, -32, 0]]))
     # From a camera 2 m before the LiDAR, the same box shows something 2 m further.
     before = Rig(cameras=(PinholeCamera(position=(2.0, 0.0, 0.0)),))
-    assert box_places(seen(person), before) == pytest.approx(np.array([[18, 8]]))
+    assert box_places(seen(person), before) == pytest.approx(np.array([[18, 8, 0]]))
 
 
 def test_what_stands_still_comes_nearer_and_turns_away():
@@ -187,28 +187,6 @@ def test_a_tracked_person_has_a_hull_and_no_box(person_at, tracks_at):
     tracks = tracks_at(("pedestrian", 10.0, 0.0, 0.0, 0.0), z=0.0, size=(0.7, 0.7, 1.76))
     layers = layers_after(CareAimed(Rig(cameras=(AHEAD,))), person_at(10, tracks=tracks.rows()))
     assert [len(layer) for layer in layers[:5]] == [0, 1, 1, 0, 0]
-
-
-def test_a_box_is_served_fully_where_it_is_new_and_briefly_afterwards(environment, encounter):
-    policy = care_sim.make_policy("care-aimed", environment)
-    before, counts = None, np.zeros(2, int)
-    for observation in encounter:
-        belief = policy.rig.read(observation)
-        policy(observation)
-        detections = belief.detections
-        places = box_places(detections, policy.rig), detections.classes >= 3
-        new = np.ones(len(detections), bool)
-        if before is not None:
-            places_then = standing_still(before[0], belief.ego, policy.rig.keyframe_s)
-            new = ~have_counterparts(places, (places_then, before[1]))
-        residual = ~explained(detections, belief.tracks, policy.rig)
-        fresh, _, _, older, *_ = policy.demanded.layers
-        for sets, chosen, most in ((fresh, residual & new, 24), (older, residual & ~new, 3)):
-            every = aimed(wedges(detections.take(chosen), policy.rig), policy.rig)
-            assert [cells.tolist() for cells in sets] == [cells[:most].tolist() for cells in every]
-        counts += len(fresh), len(older)
-        before = places
-    assert counts.min() > 0
 
 
 def test_front_hulls_and_rows_without_a_camera(belief_of, car):
