@@ -89,6 +89,7 @@ WITHOUT = {
         "last picture": Entry(NEWEST, (("new", False),)),
         "rows ahead": Entry(NEWEST, (("front", False),)),
         "aim": Entry(NEWEST, (("aim", False),)),
+        "residual and last picture": Entry(NEWEST, (("new", False), ("residual", False))),
     },
 }
 """Policies of ours with one idea removed."""

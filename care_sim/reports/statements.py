@@ -40,6 +40,7 @@ QUESTIONS: tuple[Pair, ...] = (
     ("care-sector", "tuned-place"),
     ("care-sector", "after-ancha"),
     ("care core-spread", "all-camera core-spread"),
+    ("care", "rows"),
     ("care-sightlines", "learned-sets"),
     ("tuned-place", "learned-sets"),
 )
