@@ -156,9 +156,14 @@ def reachable(name: str, result: BudgetResult, kind: str = "world") -> str:
 
 
 def least_notes(rows: Sequence[TableRow]) -> list[str]:
-    """Return the note that explains ≤, where rows of a table have it."""
-    has_least = any("≤" in entry for row in rows for entry in row)
-    return ["≤: the smallest budget is enough."] if has_least else []
+    """Return the notes that explain ≤ and (+7), where rows of a table have them."""
+    notes = {
+        "≤": "≤: the smallest budget is enough.",
+        "(+": "(+7): seven more counts reach 90% no earlier.",
+    }
+    return [
+        note for sign, note in notes.items() if any(sign in each for row in rows for each in row)
+    ]
 
 
 def sorted_by_budget(results: Sequence[BudgetResult]) -> list[BudgetResult]:

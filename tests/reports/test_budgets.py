@@ -49,7 +49,7 @@ def test_the_smallest_budget_comes_first_with_what_holds_it_back():
             "3-4",
             "place",
             "never [never, never]",
-            "kept, and 1 more",
+            "kept (+1)",
             *["≤0.5"] * 2,
             *["never"] * 2,
             "never",
@@ -147,18 +147,18 @@ def test_parts_stand_side_by_side_and_the_worse_one_is_the_score():
     whole, streets, drives = budget_tables(results)
     assert whole.columns[3:] == ("held back by", "streets", "recorded", "times care-sector")
     assert [tuple(map(str, row[1:6])) for row in whole.rows] == [
-        ("care-sector", "2.4 [2.4, 2.4]", "streets: emerging, and 7 more", *["2.4 [2.4, 2.4]"] * 2),
+        ("care-sector", "2.4 [2.4, 2.4]", "streets: emerging (+7)", *["2.4 [2.4, 2.4]"] * 2),
         (
             "tuned-place",
             "never [never, never]",
-            "recorded: emerging, and 3 more",
+            "recorded: emerging (+3)",
             "≤0.5 [≤0.5, ≤0.5]",
             "never [never, never]",
         ),
         (
             "boxes",
             "never [never, never]",
-            "streets: emerging, and 3 more",
+            "streets: emerging (+3)",
             "never [never, never]",
             "≤0.5 [≤0.5, ≤0.5]",
         ),
@@ -192,9 +192,9 @@ def test_the_idea_that_is_worth_most_comes_first():
     table = ideas_table(whole, {"rows": nothing, "camera": never, "residual": later})
     assert table.columns[3:] == ("times care-sector", "streets", "recorded")
     assert [(row[0], *row[2:]) for row in table.rows] == [
-        ("without camera", "recorded: emerging, and 3 more", "never", "1.00 [1.00, 1.00]", "never"),
-        ("without residual", "streets: emerging, and 7 more", *["1.58 [1.58, 1.58]"] * 3),
-        ("without rows", "streets: emerging, and 7 more", *["1.00 [1.00, 1.00]"] * 3),
+        ("without camera", "recorded: emerging (+3)", "never", "1.00 [1.00, 1.00]", "never"),
+        ("without residual", "streets: emerging (+7)", *["1.58 [1.58, 1.58]"] * 3),
+        ("without rows", "streets: emerging (+7)", *["1.00 [1.00, 1.00]"] * 3),
     ]
 
 

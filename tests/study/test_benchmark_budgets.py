@@ -97,7 +97,7 @@ def test_a_file_holds_streets_and_drives(tmp_path, monkeypatch):
     content = json.loads((tmp_path / "mine.json").read_text())
     assert [*content["counts"]] == ["streets", "recorded ahead", "recorded"]
     assert content["b90_percent"][0] == "never"
-    assert content["held_back_by"] == "recorded ahead: emerging, and 7 more"
+    assert content["held_back_by"] == "recorded ahead: emerging (+7)"
     assert result.of_part(STREETS).score.budget < 0.03
     assert result.of_part(AHEAD).worlds == ((AHEAD, "kitti/0000"),)
 
@@ -109,7 +109,7 @@ def test_what_holds_an_entry_back_names_the_part_where_there_are_several():
     assert one.held_back_by == "kept"
     assert made_budgets("care", *curves, recorded=drives).held_back_by == "streets: kept"
     late = made_budgets("care", *curves, recorded=drives, later=NEVER)
-    assert late.held_back_by == "recorded: emerging, and 3 more"
+    assert late.held_back_by == "recorded: emerging (+3)"
     assert made_budgets("care", *[ALWAYS] * 4).held_back_by == ""
 
 

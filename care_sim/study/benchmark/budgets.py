@@ -170,7 +170,7 @@ class BudgetResult:
             return ""
         part, name = names[last[0]]
         text = f"{part}: {name}" if len(self.parts) > 1 else name
-        return f"{text}, and {len(last) - 1} more" if len(last) > 1 else text
+        return f"{text} (+{len(last) - 1})" if len(last) > 1 else text
 
     def cut_to(self, worlds: Iterable[tuple[str, int | str]]) -> "BudgetResult | None":
         """Return the result in these worlds, in their order; None where one is missing."""
