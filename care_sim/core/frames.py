@@ -20,6 +20,9 @@ Pose = tuple[float, float, float]
 _Place = tuple[float, float, float, float]
 _Number = TypeVar("_Number", float, Floats)
 
+FULL_TURN = 2 * np.pi + 1e-6
+"""Larger angles are degrees, or no angles."""
+
 
 def mounted_at(
     place: tuple[_Number, _Number], turn: tuple[_Number, _Number], at: tuple[float, float, float]

@@ -12,14 +12,16 @@ from pyarrow import csv
 from care_sim.base.errors import InvalidInput
 
 
-def read_csv(path: Path, headless: bool = False) -> Any:
+def read_csv(path: Path, headless: bool = False, texts: Sequence[str] = ()) -> Any:
     """Return a CSV file as an Arrow table; without a heading its columns are f0, f1, and so on.
+    The columns `texts` hold texts, even if these look like numbers or times.
 
     Raises InvalidInput for a file that is missing or no table.
     """
     options = csv.ReadOptions(autogenerate_column_names=headless, use_threads=False)
+    types = csv.ConvertOptions(column_types=dict.fromkeys(texts, pyarrow.string()))
     try:
-        return csv.read_csv(path, read_options=options)
+        return csv.read_csv(path, read_options=options, convert_options=types)
     except (OSError, ValueError, pyarrow.ArrowException) as error:
         told = " ".join(str(error).split())[:200]
         raise InvalidInput(f"{path}: no CSV table ({told})") from error

@@ -171,7 +171,8 @@ def read_curves(file: str | os.PathLike[str]) -> Curves:
     for name in dict.fromkeys(names.tolist()) if len(names) else CLASSES:
         check_known(f"class in {path}", name, CLASSES)
         numbers, shares = rows[names == name if len(names) else slice(None)].T
-        if not (len(numbers) and numbers[0] >= 1 and (np.diff(numbers) > 0).all()):
+        ascends = len(numbers) and numbers[0] >= 1 and (np.diff(numbers) > 0).all()
+        if not (ascends and np.isfinite(numbers).all()):
             raise InvalidInput(
                 f"{path}: returns of {name} must ascend from 1 or more, got "
                 f"{shown(numbers.tolist())}"

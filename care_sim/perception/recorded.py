@@ -15,7 +15,7 @@ from care_sim.base.digests import Stamp, file_stamp
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.files import parsed_json
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.frames import Frame
+from care_sim.core.frames import FULL_TURN, Frame
 from care_sim.core.types import CLASSES, Detections
 from care_sim.perception.points_only import ATTRIBUTES, Detector, inside, objects_behind
 from care_sim.sensors.annotated import Annotations, Cloud
@@ -25,7 +25,6 @@ COLUMNS = ("keyframe", "class", *BOX)
 """Columns of a CSV file of results."""
 FARTHEST_M = 1e7
 """Largest coordinate of a map, metres."""
-FULL_TURN = 2 * np.pi + 1e-6
 _MARGIN_M = 0.2
 """Reported boxes are off by a few centimetres, and returns lie on the surface of the object."""
 
@@ -70,7 +69,9 @@ class RecordedDetector(Detector):
         whose keyframes nobody recorded.
         """
         if self._here is None:
-            raise InvalidInput("the detector recorded plays films alone, and this is no film")
+            raise InvalidInput(
+                f"the detector recorded plays films: {self._file} has no results of the closed loop"
+            )
         token, sensor = self._here
         cloud = cloud.whole
         reported = self._results[token]
@@ -112,11 +113,13 @@ def _csv_results(path: Path, _stamp: Stamp) -> dict[str, Detections]:
     # Imported here because it loads PyArrow.
     from care_sim.perception.csv_tables import columns_of, read_csv, texts_of
 
-    table = read_csv(path)
+    table = read_csv(path, texts=COLUMNS[:2])
     tokens, names = (texts_of(path, table, column) for column in COLUMNS[:2])
     numbers = columns_of(path, table, BOX)
     rows: dict[str, list[int]] = {}
     for number, (token, name) in enumerate(zip(tokens, names, strict=True)):
+        if not token:
+            raise InvalidInput(f"{path}, line {number + 2}: a row must name its keyframe")
         own = rows.setdefault(token, [])
         if not name:
             continue

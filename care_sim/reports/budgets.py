@@ -159,7 +159,8 @@ def least_notes(rows: Sequence[TableRow]) -> list[str]:
     """Return the notes that explain ≤ and (+7), where rows of a table have them."""
     notes = {
         "≤": "≤: the smallest budget is enough.",
-        "(+": "(+7): seven more counts reach 90% no earlier.",
+        "(+": "(+n): n more counts reach 90% no earlier.",
+        "[0.00": "0.00: the other policy never reaches 90%.",
     }
     return [
         note for sign, note in notes.items() if any(sign in each for row in rows for each in row)

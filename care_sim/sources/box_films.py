@@ -13,7 +13,7 @@ from care_sim.base.checks import as_array, check_known
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.cells.stack import Grid
-from care_sim.core.frames import Frame
+from care_sim.core.frames import FULL_TURN, Frame
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import SensorSetup
 from care_sim.core.types import CLASSES, Ego
@@ -30,7 +30,6 @@ from care_sim.sensors.surround import (
 )
 from care_sim.sources.film_checks import (
     AWAY_M,
-    FULL_TURN,
     LEAST_KEYFRAMES,
     MAP_M,
     SIZES_M,

@@ -14,7 +14,7 @@ import numpy as np
 from care_sim.base.errors import InvalidInput, report_problems, shown
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.cells.boxes import planar_ranges
-from care_sim.core.frames import Frame
+from care_sim.core.frames import FULL_TURN, Frame
 from care_sim.core.types import CLASSES
 from care_sim.loops.film import Film, Shot
 from care_sim.sensors.annotated import Annotations, Cloud
@@ -72,7 +72,6 @@ def quaternion_fault(turns: Floats, has_heading: bool = True) -> tuple[int, str]
 
 LEAST_KEYFRAMES = 3
 """Fewer keyframes give neither an acceleration nor a first sighting that a track follows."""
-FULL_TURN = 2 * np.pi + 1e-6
 MOVES_M = 5.0
 """The car must move so far in the life of an object, or nothing is known of the object's frame."""
 STILL_M = (0.3, 1.0)

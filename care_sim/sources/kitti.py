@@ -24,12 +24,12 @@ from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput, shown, unknown
 from care_sim.base.files import check_file_size
 from care_sim.core.arrays import Floats
-from care_sim.core.frames import Frame
+from care_sim.core.frames import FULL_TURN, Frame
 from care_sim.core.sensor_setup import SensorSetup, between, on_car
 from care_sim.loops.film import Film
 from care_sim.sensors.setups import sensor_setup
 from care_sim.sources.box_films import film_of_boxes
-from care_sim.sources.film_checks import FULL_TURN, MAP_M, report_once
+from care_sim.sources.film_checks import MAP_M, report_once
 from care_sim.sources.recordings import Recordings
 
 KITTI_CATEGORIES: dict[str, str | None] = {

@@ -159,6 +159,7 @@ def test_without_classes_a_curve_is_for_all(tmp_path):
         (["returns,recall", "0,0.2"], r"returns of car must ascend from 1 or more, got \[0.0\]"),
         (["returns,recall", "5,0.2", "5,0.3"], "must ascend from 1 or more"),
         (["returns,recall", ",0.2"], "must ascend from 1 or more"),
+        (["returns,recall", "1,0.2", "inf,0.3"], r"must ascend from 1 or more, got \[1.0, inf\]"),
         (["returns,recall"], r"must ascend from 1 or more, got \[\]"),
         (["class,returns,recall", "Car,5,0.2"], "unknown class in .*recall.csv 'Car'; .*is car"),
         (["class,returns,recall", "5,0.2"], "no CSV table"),

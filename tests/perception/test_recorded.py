@@ -71,7 +71,7 @@ def test_a_box_that_is_none_is_named(tmp_path, box, fault):
 
 def test_keyframes_that_nobody_recorded_are_named(tmp_path):
     detector = make_detector("recorded", HEIGHT, file=file_of(tmp_path))
-    with pytest.raises(InvalidInput, match="plays films alone"):
+    with pytest.raises(InvalidInput, match="has no results of the closed loop"):
         detector.detect(ON_IT, NO_ANNOTATIONS)
     with pytest.raises(InvalidInput, match="has no results of the keyframe 'there'"):
         detector.at("there", SENSOR)
@@ -111,6 +111,14 @@ def test_a_table_holds_boxes_in_the_frame_of_the_lidar(tmp_path):
         detector.at("elsewhere", SENSOR)
 
 
+@pytest.mark.parametrize("token", ["001", "2026-01-01 00:00:00.5"])
+def test_a_keyframe_may_look_like_a_number_or_a_time(tmp_path, token):
+    path = table_of(tmp_path, HEAD, ROW.replace("here", token))
+    detector = make_detector("recorded", HEIGHT, file=path)
+    detector.at(token, SENSOR)
+    assert len(detector.detect(ON_IT, NO_ANNOTATIONS)[0]) == 1
+
+
 def test_a_table_plays_a_film_of_boxes(tmp_path):
     """The reports are the true boxes, so whatever returns is detected where it stands."""
     poses = [[100 + 4.0 * k, 50.0, 10.0, 0.3] for k in range(4)]
@@ -139,6 +147,7 @@ def test_a_table_plays_a_film_of_boxes(tmp_path):
         ([HEAD, ROW.replace("1.6", "0")], "sizes above 0"),
         ([HEAD, ROW.replace(",10,", ",,")], "must be metres"),
         ([HEAD, ROW.replace(",10,", ",near,")], "the column x must hold numbers"),
+        ([HEAD, ROW.replace("here", "")], "results.csv, line 2: a row must name its keyframe"),
     ],
 )
 def test_a_wrong_row_of_a_table_is_named_in_one_line(tmp_path, lines, fault):

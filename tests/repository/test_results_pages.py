@@ -2,6 +2,7 @@
 question, which begins with the answer.
 """
 
+import json
 import re
 import shlex
 from collections import Counter
@@ -108,6 +109,17 @@ def test_the_first_page_names_scores_as_they_are(page):
     assert {statement(columns, *pair).verdict for pair in combinations(tied, 2)} == {TIED}
     assert statement(columns, fewer, more).fewer == (MAIN_DETECTOR,)
     assert statement(columns, more, alike).verdict == TIED
+    # The worth of the residual in two rules, on the streets of the trial.
+    older, newer = (
+        float(row[4].split()[0])
+        for table in loaded(ROOT / "docs" / "b90_results.py").trial()[:2]
+        for row in table.rows
+        if row[0] == "without residual"
+    )
+    worth = f"needs {older:.1f} times the rays, `care-aimed` {newer} times"
+    assert (
+        page != "README.md" or f"On 24 streets, `care-sector` without the residual {worth}" in text
+    )
 
 
 def test_the_table_of_b90_is_that_of_the_published_entries():
@@ -115,6 +127,9 @@ def test_the_table_of_b90_is_that_of_the_published_entries():
     ordered = references(MAIN_DETECTOR)
     results = {one.entry: one.of_part(STREETS) for one in ordered}
     assert [*results] == [*REFERENCE_ENTRIES, *BOUNDS]
+    # Files say of entries, for people, the same as their rows.
+    told = json.loads((ROOT / "care_sim/study/benchmark/references/centerpoint.json").read_text())
+    assert [one["held_back_by"] for one in told] == [one.held_back_by for one in ordered]
     streets = tuple((STREETS, seed) for seed in budget_worlds()[STREETS])
     assert {one.worlds for one in results.values()} == {streets}
     tables = script.written()

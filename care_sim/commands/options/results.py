@@ -53,9 +53,8 @@ class Benchmark(WorkerOptions):
     name: str = ""
     """Name of the entry in tables, if a single policy is played."""
     detector: str = "centerpoint"
-    """The detector. Entries are ranked under centerpoint, and only its results are printed beside
-    published entries. `results/b90.md` lists B90 on streets under megvii, pointrcnn and returns,
-    too."""
+    """The detector. Entries are ranked under centerpoint. Published entries on streets are printed
+    beside results under megvii, pointrcnn and returns, too."""
     detector_parameters: tuple[str, ...] = ()
     """Parameters of the detector as NAME=VALUE. Published entries have none."""
     closed_loop: Flag = False

@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.frames import Frame
+from care_sim.core.frames import FULL_TURN, Frame
 from care_sim.perception.csv_tables import columns_of, read_csv
-from care_sim.sources.film_checks import FULL_TURN, MAP_M, check_span, quaternion_fault
+from care_sim.sources.film_checks import MAP_M, check_span, quaternion_fault
 from care_sim.sources.sweeps.points import READERS, in_seconds, read_sweep
 
 SWEEPS_KEYFRAME_S = 0.5
