@@ -22,7 +22,7 @@ from care_sim.reports.budgets import budget_tables
 from care_sim.reports.figures.leaderboard import LEADERBOARD_FIGURE, leaderboard_figure
 from care_sim.reports.figures.styles import check_figure, save
 from care_sim.study.benchmark.budgets import MAIN_DETECTOR, BudgetResult
-from care_sim.study.benchmark.maker import elsewhere, own_code_of
+from care_sim.study.benchmark.maker import detector_files, elsewhere, own_code_of
 from care_sim.study.benchmark.play import player_in
 from care_sim.study.benchmark.recorded import recorded_drives
 from care_sim.study.benchmark.replay import replayed
@@ -58,7 +58,8 @@ def _tables(found: dict[Path, BudgetResult]) -> list[list[BudgetResult]]:
 
 def _worlds_of(result: BudgetResult) -> tuple[object, ...]:
     """Return what two results share that can be compared."""
-    return result.detector, result.detector_parameters, result.sealed, result.worlds
+    looking = result.detector, result.detector_parameters, detector_files(result.made_by)
+    return *looking, result.sealed, result.worlds
 
 
 def _show(options: Leaderboard, sets: Sequence[Sequence[BudgetResult]]) -> None:
@@ -95,7 +96,7 @@ def _verified(options: Leaderboard, results: dict[Path, BudgetResult]) -> list[s
         except (InvalidInput, MissingExtra) as error:
             problems.append(f"{path} cannot be verified: {error}")
             continue
-        made = elsewhere(result.entry, result.made_by)
+        made = elsewhere(result.entry, result.made_by, result.detector_parameters)
         maker = f"; played {made}" if made else ""
         worlds = f"{counted(replay.played, 'world')} of {len(result.rows)}, drawn by lot,"
         moved = f"sums move by up to {percent(round(replay.moved, 3))}"

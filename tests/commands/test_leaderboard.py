@@ -30,6 +30,8 @@ def test_every_set_of_worlds_and_every_detector_has_its_table(capsys, here):
         "trial": {"quick": True, "streets": 24},
         "other": {"detector": "megvii"},
         "own": {"detector_parameters": (("worth", 2),)},
+        # A detector's file has changed since.
+        "changed": {"detector_parameters": (("worth", 2),), "made_by": {"detector_files": ["5"]}},
         "sealed": {"sealed": "5" * 64, "first": 0},
         "fresh": {"first": 2**31},
     }.items():
@@ -48,6 +50,7 @@ def test_every_set_of_worlds_and_every_detector_has_its_table(capsys, here):
     # Published entries are of published streets, under detectors as they are shipped.
     page = (here / "runs" / "leaderboard" / "leaderboard.md").read_text()
     assert page.count("| care-sightlines |") == 3
+    assert titles.count("80 worlds (streets), centerpoint (worth=2)") == 2
     assert page.count("A trial") == 1
     for n, title in enumerate(titles):
         figure = f"leaderboard-{n}.svg" if n else "leaderboard.svg"

@@ -156,6 +156,11 @@ def test_a_result_names_the_code_and_the_files_that_made_it(tmp_path):
     weights.write_text("2")
     assert elsewhere(entry, made) == "by other code than here"
     assert own_code_of(made_by(entry)) != own_code_of(made)
+    looking = (("file", str(weights)),)
+    made = made_by(entry, looking)
+    assert elsewhere(entry, made, looking) == ""
+    weights.write_text("3")
+    assert elsewhere(entry, made, looking) == "with other files of the detector than here"
 
 
 def test_published_entries_stand_beside_results_of_the_same_worlds(tmp_path, monkeypatch):

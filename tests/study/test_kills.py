@@ -70,7 +70,7 @@ def test_whatever_ends_a_study_leaves_no_process_and_the_same_command_goes_on(tm
 
 @pytest.mark.parametrize("policy", ["starts-thread", "forks"])
 def test_a_study_ends_whatever_a_policy_has_started(policy, third_party, tmp_path, monkeypatch):
-    monkeypatch.setenv("PYTHONPATH", str(third_party))
+    monkeypatch.setenv("PYTHONPATH", str(third_party), prepend=os.pathsep)
     options = ["--policies", policy, "--budgets", "0.1", "--seeds", "2", "--workers", "2"]
     short = ["--scenarios", "dartout", "--scenario-parameters", "duration_s=0.3"]
     out = tmp_path / "out"

@@ -302,7 +302,7 @@ def play_budgets(
                     detector,
                     tuple(_row(*world, got) for world, got in zip(named, rows, strict=True)),
                     quick,
-                    made_by(entry),
+                    made_by(entry, detector_parameters),
                     salt.digest if salt else None,
                     _policy_ms(
                         [own for (part, _), own in zip(named, rows, strict=True) if part == STREETS]

@@ -6,14 +6,26 @@ from typing import Any
 from care_sim.base.errors import printable
 from care_sim.study.benchmark.suite import Entry
 from care_sim.study.provenance import code_digest, machine, policy_digest, versions
+from care_sim.study.rows.parameters import Parameters
 from care_sim.study.run_config import files_in
 
 MadeBy = Mapping[str, Any]
 
 
-def made_by(entry: Entry) -> dict[str, Any]:
-    """Return what makes the results of an entry here."""
-    return {"versions": versions(), **_own_code(entry), "machine": machine()}
+def made_by(entry: Entry, of_detector: Parameters = ()) -> dict[str, Any]:
+    """Return what makes the results of an entry here, under a detector with these parameters."""
+    files = files_in(of_detector)
+    return {
+        "versions": versions(),
+        **_own_code(entry),
+        **({"detector_files": files} if files else {}),
+        "machine": machine(),
+    }
+
+
+def detector_files(maker: MadeBy) -> str:
+    """Return the hashes of the detector's files that a result names, as one text."""
+    return str(maker.get("detector_files", []))
 
 
 def own_code_of(maker: MadeBy) -> str:
@@ -21,10 +33,13 @@ def own_code_of(maker: MadeBy) -> str:
     return f"{maker.get('policy_code', '')} {maker.get('parameter_files', [])}"
 
 
-def elsewhere(entry: Entry, maker: MadeBy) -> str:
+def elsewhere(entry: Entry, maker: MadeBy, of_detector: Parameters = ()) -> str:
     """Return in words what made a result of the entry, and an empty text if all of it is here."""
-    if maker == made_by(entry):
+    here = made_by(entry, of_detector)
+    if maker == here:
         return ""
+    if detector_files(maker) != detector_files(here):
+        return "with other files of the detector than here"
     versions_there, there = (maker.get(name) for name in ("versions", "machine"))
     code = versions_there.get("code") if isinstance(versions_there, dict) else ""
     processor = printable(str(there.get("processor", ""))) if isinstance(there, dict) else ""

@@ -85,7 +85,8 @@ def replayed(
     pairs = zip(told.rows, again.rows, strict=True)
     differing = tuple((one.part, one.world) for one, other in pairs if one != other)
     moved = _moved(told, again)
-    is_false = moved > ROUNDING or (differing and result.made_by == made_by(result.entry))
+    here = made_by(result.entry, result.detector_parameters)
+    is_false = moved > ROUNDING or (differing and result.made_by == here)
     false = [f"{len(differing)} of {len(told.rows)} worlds have other counts"] if is_false else []
     return Replay(len(told.rows), differing, moved, (*_false_tags(result), *false))
 
