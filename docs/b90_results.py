@@ -104,6 +104,9 @@ EXAMPLE = Entry("aimed_boxes:AimedBoxes")
 """A short rule, in `docs/examples`."""
 TIGHT = FOLDER / "tight.json"
 """The results of the published entries in tight tests."""
+FRESH = FOLDER / "fresh.json"
+"""The results of seven entries on 40 streets that `care-sim benchmark --fresh 40` drew, after all
+numbers of the policies were set."""
 TRIAL = FOLDER / "trial.json"
 """The results of entries that are not published: of ideas on the streets of a trial and on all
 drives, of `TUNED` on `RECORDED` drives, of `EXAMPLE` on all worlds.
@@ -225,6 +228,7 @@ def written() -> str:
         sources_table(main),
         *trial(),
         budgets_table(read_list(TIGHT)),
+        budgets_table(read_list(FRESH)),
         *statements(),
         conventions(),
     ]

@@ -16,7 +16,7 @@ from care_sim.core.defaults import AS_DEMANDED
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, ratio_level
 from care_sim.evaluation.smallest_budget import budget_ratio
 from care_sim.policies import BUILT_IN
-from care_sim.reports.budgets import format_budget
+from care_sim.reports.budgets import format_budget, sorted_by_budget
 from care_sim.reports.statements import TIED, TURNS_OVER, statement
 from care_sim.study.benchmark.bounds import BOUNDS
 from care_sim.study.benchmark.budgets import (
@@ -24,7 +24,7 @@ from care_sim.study.benchmark.budgets import (
     REFERENCE_ENTRIES,
     budget_worlds,
 )
-from care_sim.study.benchmark.result import references
+from care_sim.study.benchmark.result import read_list, references
 from care_sim.study.benchmark.suite import STREETS, Entry
 from care_sim.study.results_formats import EPISODES
 from care_sim.study.rows.parquet import read_rows
@@ -143,6 +143,10 @@ def test_the_table_of_b90_is_that_of_the_published_entries():
     assert (len(turned), "Of the pairs in the table, five turn over" in page) == (5, True)
     told = page.partition("five turn over.**")[2].partition("## ")[0]
     assert {f"`{name}`" for pair in turned for name in pair} <= {*re.findall(r"`[\w-]+`", told)}
+    fresh = [one for one in read_list(script.FRESH) if one.entry.policy != "place"]
+    told = [f"`{one.entry.name}` {format_budget(one.score.budget)}" for one in fresh]
+    assert ", ".join(told) in page
+    assert [one.entry for one in sorted_by_budget(fresh)] == [one.entry for one in fresh]
     # Ratios to other entries than the tables', and what a full scan has.
     care, core_first, all_camera = (
         results[Entry(name, cell_order=order)].counts
