@@ -156,7 +156,7 @@ def reachable(name: str, result: BudgetResult, kind: str = "world") -> str:
 
 
 def least_notes(rows: Sequence[TableRow]) -> list[str]:
-    """Return the notes that explain ≤ and (+7), where rows of a table have them."""
+    """Return the notes that explain ≤, (+n) and 0.00, where rows of a table have them."""
     notes = {
         "≤": "≤: the smallest budget is enough.",
         "(+": "(+n): n more counts reach 90% no earlier.",

@@ -147,6 +147,12 @@ def test_the_table_of_b90_is_that_of_the_published_entries():
     told = [f"`{one.entry.name}` {format_budget(one.score.budget)}" for one in fresh]
     assert ", ".join(told) in page
     assert [one.entry for one in sorted_by_budget(fresh)] == [one.entry for one in fresh]
+    _, newest, *_ = script.trial()
+    worth = {row[0]: row[4] for row in newest.rows}
+    assert (
+        f"{worth['without residual']} times the cells without the residual, and "
+        f"{worth['without last picture']} times without the last picture"
+    ) in page
     # Ratios to other entries than the tables', and what a full scan has.
     care, core_first, all_camera = (
         results[Entry(name, cell_order=order)].counts
