@@ -10,17 +10,33 @@ import numpy as np
 
 from care_sim.base.errors import MissingExtra
 from care_sim.base.extras import import_torch
+from care_sim.envs import ENVIRONMENT_IDS
 from care_sim.policies import make_policy
 from care_sim.study.executors import processes
 from care_sim.training.config import PpoConfig
 from care_sim.training.environments import side_by_side
 from care_sim.training.run import algorithm, make_learner
-from tests.bench.environments import EPISODE, MAIN, by_name
+from tests.bench.environments import EPISODE, MAIN, TESTS, by_name
 
 WORLDS = 64
 THREADS = {1: "one thread", 2: "two threads"}
 PROCESSES = f"{WORLDS} worlds, two processes"
 """Half of the worlds in each, with a vector and a policy of its own, on one thread."""
+MEASURED = {
+    "budget": 0.01,
+    "detector": "centerpoint",
+    "camera_profile": "kitti",
+    "camera_latency_s": 0.12,
+}
+"""The conditions of the benchmark in the closed loop."""
+BENCHMARK = {
+    f"{WORLDS} {name} of the benchmark at 1%, two threads": (environment, arguments)
+    for name, environment, arguments in (
+        ("drives", ENVIRONMENT_IDS["drive"], {}),
+        ("tests", TESTS, {"test": "drawn", "speed_kph": 0}),
+    )
+}
+"""Rows with the measured camera and detector: the environment and its further arguments."""
 RECIPE = PpoConfig(budget=(0.03, 0.05, 0.1, 0.2, 0.35))
 """How the shipped `ppo-dense` was trained."""
 PPO = f"PPO of Stable-Baselines3, {RECIPE.environments} worlds of {', '.join(RECIPE.env)}"
@@ -39,10 +55,16 @@ def batches(settings):
     The policy chooses for all worlds, observations are handed out at every step, and episodes that
     are over begin anew. All rows are measured in every round. Not to be called on one core.
     """
-    makers = {row(n, told): partial(_ours, n, told) for told, n in product((True, False), THREADS)}
+    makers = {
+        row(n, told): partial(_ours, n, scoring_info=told)
+        for told, n in product((True, False), THREADS)
+    } | {
+        name: partial(_ours, 2, environment=environment, **MEASURED, **arguments)
+        for name, (environment, arguments) in BENCHMARK.items()
+    }
     # An episode that nobody times: what is compiled late, is compiled in it.
     for told in (True, False):
-        speed_of(partial(_ours, 1, told, worlds=2), 0.0)
+        speed_of(partial(_ours, 1, worlds=2, scoring_info=told), 0.0)
     with processes(2) as pool:
         rounds = [
             {name: speed_of(make, settings.seconds) for name, make in makers.items()}
@@ -89,15 +111,14 @@ def _speed_of_half(seconds):
     return speed_of(make, seconds)
 
 
-def _ours(threads, scoring_info=True, worlds=WORLDS):
+def _ours(threads, environment=MAIN, worlds=WORLDS, **arguments):
     vector = gymnasium.make_vec(
-        f"care_sim:{MAIN}",
+        f"care_sim:{environment}",
         num_envs=worlds,
         vectorization_mode="vector_entry_point",
         threads=threads,
-        budget=EPISODE.budget,
-        scoring_info=scoring_info,
         copy=False,
+        **{"budget": EPISODE.budget} | arguments,
     )
     return vector, make_policy(EPISODE.policy, vector)
 
