@@ -21,8 +21,9 @@ from care_sim.base.errors import report_problems
 from care_sim.base.files import write_text
 from care_sim.base.interrupts import FAILED
 from care_sim.core.conditions import RAYS
-from care_sim.evaluation.counts import SCENE_COUNTS
-from care_sim.evaluation.smallest_budget import ENOUGH
+from care_sim.evaluation.bootstrap import ratio_of_sums
+from care_sim.evaluation.counts import KEPT, SCENE_COUNTS
+from care_sim.evaluation.smallest_budget import BUDGETS, ENOUGH
 from care_sim.evaluation.strata import EMERGING
 from care_sim.reports.budgets import (
     budget_tables,
@@ -63,6 +64,8 @@ PAGE = Path(__file__).parents[1] / "results" / "b90.md"
 FOLDER = PAGE.parent / "data" / "b90"
 DETECTORS = (MAIN_DETECTOR, "megvii", "pointrcnn", "returns")
 """The main one first."""
+POINT_DETECTORS = ("cluster", "pillars")
+"""Detectors that get points. They are slow, and play the streets of a trial."""
 WHOLE, NEWEST = "care-sector", "care-aimed"
 DRAWN = (
     NEWEST,
@@ -99,13 +102,18 @@ MORE = [
     for entry in ideas.values()
     if entry not in REFERENCE_ENTRIES
 ]
+WITH_RESIDUAL = (
+    (WHOLE, WITHOUT[WHOLE]["residual"].name),
+    ("care core-spread", "all-camera core-spread"),
+)
+"""Published pairs: with the residual and without. `all-camera` has sets for all camera boxes."""
 TUNED = Entry("tuned-place", label="tuned on the other drives")
 EXAMPLE = Entry("aimed_boxes:AimedBoxes")
 """A short rule, in `docs/examples`."""
 TIGHT = FOLDER / "tight.json"
 """The results of the published entries in tight tests."""
 FRESH = FOLDER / "fresh.json"
-"""The results of seven entries on 40 streets that `care-sim benchmark --fresh 40` drew, after all
+"""The results of seven entries on 200 streets that `care-sim benchmark --fresh 200` drew, after all
 numbers of the policies were set."""
 TRIAL = FOLDER / "trial.json"
 """The results of entries that are not published: of ideas on the streets of a trial and on all
@@ -152,9 +160,11 @@ def example_tables(example: BudgetResult, neighbours: Sequence[BudgetResult]) ->
     ]
 
 
-def statements() -> list[Table]:
-    """Return the tables over all detectors that have played, on streets; none for the main one."""
-    columns = {detector: references(detector) for detector in DETECTORS}
+def statements(detectors: Sequence[str]) -> list[Table]:
+    """Return the tables over those detectors that have played, on their common streets; none for
+    one alone.
+    """
+    columns = {detector: references(detector) for detector in detectors}
     streets = {
         detector: [one.of_part(STREETS) for one in results]
         for detector, results in columns.items()
@@ -180,14 +190,63 @@ def conventions() -> Table:
     return statements_table(scored, pairs, "convention")
 
 
+def small_budgets() -> Table:
+    """Return the table of what `WITH_RESIDUAL` detect on streets at small budgets, beside the same
+    policy without the residual: in % of a full scan's counts, and by how much more.
+    """
+    columns = {
+        detector: {one.entry.name: one.of_part(STREETS) for one in references(detector)}
+        for detector in DETECTORS
+    }
+    places = [SCENE_COUNTS.index(count) for count in (EMERGING, KEPT)]
+    rows = [
+        (
+            ours,
+            f"{100 * BUDGETS[budget]:g}%",
+            *(
+                cell
+                for place in places
+                for cell in _more(columns[MAIN_DETECTOR], (ours, theirs), budget, place)
+            ),
+            *(_more(own, (ours, theirs), budget, places[0])[-1] for own in [*columns.values()][1:]),
+        )
+        for ours, theirs in WITH_RESIDUAL
+        for budget in range(4)
+    ]
+    return Table(
+        "The residual at small budgets, on streets",
+        (
+            *("policy", "budget"),
+            *(head for count in (EMERGING, KEPT) for head in (f"{count}, %", "without", "more")),
+            *(f"{EMERGING}, more, {detector}" for detector in DETECTORS[1:]),
+        ),
+        tuple(rows),
+        ("Counts in % of a full scan's. `more` is in points, paired over streets.",),
+        names=2,
+    )
+
+
+def _more(
+    results: Mapping[str, BudgetResult], pair: tuple[str, str], budget: int, place: int
+) -> tuple[str, ...]:
+    """Return what two policies detect of a count in %, and the difference with its interval."""
+    ours, theirs = (
+        100 * np.array([row.got[budget][place] for row in results[name].rows]) for name in pair
+    )
+    full = np.array([row.full[place] for row in results[pair[0]].rows])
+    more = ratio_of_sums((ours - theirs, full))
+    shares = (f"{got.sum() / full.sum():.0f}" for got in (ours, theirs))
+    return *shares, f"{more.mean:+.1f} [{more.low:.1f}, {more.high:.1f}]"
+
+
 def summary_table() -> Table:
-    """Return the table of `results/b90.md`: a line per entry with its B90, that of each part, and
-    that of the streets under each other detector that has played.
+    """Return the table of `results/b90.md`: a line per entry with its B90, that of each part, that
+    of the tight tests, and that of the streets under each other detector that has played.
     """
     ordered = sorted_by_budget(references(MAIN_DETECTOR))
-    others = {
+    others = {TIGHT_TESTS: {one.entry: one for one in read_list(TIGHT)}} | {
         detector: {one.entry: one for one in results}
-        for detector in DETECTORS[1:]
+        for detector in (*DETECTORS[1:], *POINT_DETECTORS)
         if (results := references(detector))
     }
     parts = ordered[0].parts
@@ -201,7 +260,7 @@ def summary_table() -> Table:
         for one in ordered
     ]
     return Table(
-        "B90 of every entry, of each part, and of streets under other detectors",
+        "B90 of every entry, of each part, of tight tests, and of streets under other detectors",
         ("policy", "B90", *parts, *others),
         tuple(rows),
         tuple(least_notes(rows)),
@@ -229,7 +288,10 @@ def written() -> str:
         *trial(),
         budgets_table(read_list(TIGHT)),
         budgets_table(read_list(FRESH)),
-        *statements(),
+        statements_table({MAIN_DETECTOR: read_list(FRESH)}, ()),
+        *statements(DETECTORS),
+        *statements((*DETECTORS, *POINT_DETECTORS)),
+        small_budgets(),
         conventions(),
     ]
     told = "\n".join(table.markdown() for table in tables)
@@ -246,11 +308,13 @@ def play(options: Namespace) -> None:
     with player_in(options.plays, options.workers) as player:
         for detector in options.detectors:
             is_main = detector == MAIN_DETECTOR
+            is_slow = detector in POINT_DETECTORS
             # Other detectors are columns over streets alone.
-            played = worlds if is_main else {STREETS: worlds[STREETS]}
+            played = worlds if is_main else {STREETS: (fewer if is_slow else worlds)[STREETS]}
             # Bounds count on the recall of the main detector.
             bounds = BOUNDS if is_main else ()
-            results = play_budgets((*REFERENCE_ENTRIES, *bounds), player, detector, played)
+            entries = (*REFERENCE_ENTRIES, *bounds)
+            results = play_budgets(entries, player, detector, played, quick=is_slow)
             more = play_budgets(MORE if is_main else (), player, detector, fewer, quick=True)
             if is_main:
                 more += play_tuned(worlds[RECORDED], player, options.plays)
@@ -286,7 +350,8 @@ def main(words: Sequence[str] | None = None) -> None:
     """Play what `words` say, and write tables and figure."""
     parser = ArgumentParser(description=__doc__)
     parser.add_argument("--recorded", nargs="+", default=[])
-    parser.add_argument("--detectors", nargs="+", default=DETECTORS, choices=DETECTORS)
+    known = (*DETECTORS, *POINT_DETECTORS)
+    parser.add_argument("--detectors", nargs="+", default=known, choices=known)
     parser.add_argument("--plays", type=Path, default=Path("runs/b90"))
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--tables", action="store_true")

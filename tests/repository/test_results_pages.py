@@ -12,7 +12,6 @@ import pytest
 
 from care_sim import cli
 from care_sim.base.seeds import split_of
-from care_sim.core.defaults import AS_DEMANDED
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, ratio_level
 from care_sim.evaluation.smallest_budget import budget_ratio
 from care_sim.policies import BUILT_IN
@@ -116,10 +115,8 @@ def test_the_first_page_names_scores_as_they_are(page):
         for row in table.rows
         if row[0] == "without residual"
     )
-    worth = f"needs {older:.1f} times the rays, `care-aimed` {newer} times"
-    assert (
-        page != "README.md" or f"On 24 streets, `care-sector` without the residual {worth}" in text
-    )
+    worth = f"`care-sector` needs {older:.1f} times as many rays, and `care-aimed` {newer} times"
+    assert page != "README.md" or f"Without it, on 24 streets, {worth}" in text
 
 
 def test_the_table_of_b90_is_that_of_the_published_entries():
@@ -138,35 +135,41 @@ def test_the_table_of_b90_is_that_of_the_published_entries():
     # A table that is not as the files: python docs/b90_results.py --tables
     assert script.with_table(text) == text
     page = " ".join(text.split())
-    _, pairs = script.statements()
+    _, pairs = script.statements(script.DETECTORS)
     turned = [first_two for *first_two, verdict, _, _, _, _ in pairs.rows if TURNS_OVER in verdict]
-    assert (len(turned), "Of the pairs in the table, five turn over" in page) == (5, True)
-    told = page.partition("five turn over.**")[2].partition("## ")[0]
+    assert (len(turned), "**Five pairs of that table change their order.**" in page) == (5, True)
+    told = page.partition("**Five pairs ")[2].partition("## ")[0]
     assert {f"`{name}`" for pair in turned for name in pair} <= {*re.findall(r"`[\w-]+`", told)}
     fresh = [one for one in read_list(script.FRESH) if one.entry.policy != "place"]
     told = [f"`{one.entry.name}` {format_budget(one.score.budget)}" for one in fresh]
     assert ", ".join(told) in page
     assert [one.entry for one in sorted_by_budget(fresh)] == [one.entry for one in fresh]
     _, newest, *_ = script.trial()
-    worth = {row[0]: row[4] for row in newest.rows}
+    (worth,) = (row[4:] for row in newest.rows if row[0] == "without residual")
+    assert f"| `care-aimed`, 24 streets | {' | '.join(map(str, worth))} |" in page
+    rows_of = {row[:2]: row for row in script.small_budgets().rows}
+    *_, found, without, more, kept, kept_without = rows_of["care core-spread", "1%"][:7]
     assert (
-        f"{worth['without residual']} times the cells without the residual, and "
-        f"{worth['without last picture']} times without the last picture"
+        f"`care` detects {found}% of the emerging newcomers, and `all-camera` {without}% "
+        f"({more.replace(' ', ' points ', 1)}). `care` keeps {kept}% of the objects, `all-camera` "
+        f"{kept_without}%."
     ) in page
     # Ratios to other entries than the tables', and what a full scan has.
-    care, core_first, all_camera = (
-        results[Entry(name, cell_order=order)].counts
-        for name, order in (
-            ("care", AS_DEMANDED),
-            ("care", "core-spread"),
-            ("all-camera", "core-spread"),
+    rows, care, core_first, all_camera, whole, without = (
+        next(one for one in ordered if one.entry == entry)
+        for entry in (
+            *map(Entry, ("rows", "care")),
+            *(Entry(name, cell_order="core-spread") for name in ("care", "all-camera")),
+            Entry("care-sector"),
+            Entry("care-sector", (("residual", False),)),
         )
     )
-    rows, whole_care = (
-        next(one for one in ordered if one.entry == Entry(name)) for name in ("rows", "care")
-    )
-    beside = [(rows.of_part(part).counts, whole_care.of_part(part).counts) for part in rows.parts]
-    beside += [(rows.counts, whole_care.counts), (core_first, care), (core_first, all_camera)]
+    beside = [
+        (ours.of_part(part).counts, theirs.of_part(part).counts)
+        for ours, theirs in ((rows, care), (all_camera, core_first), (without, whole))
+        for part in rows.parts
+    ]
+    beside += [(rows.counts, care.counts)]
     for pair in beside:
         ratio, low, high = budget_ratio(*pair)
         tables += f"{ratio:.2f} [{low:.2f}, {high:.2f}]"
