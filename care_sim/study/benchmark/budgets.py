@@ -17,7 +17,7 @@ import numpy as np
 from care_sim.base.files import JSON, replacing
 from care_sim.core.arrays import Floats
 from care_sim.core.conditions import KITTI_CAMERA
-from care_sim.evaluation.counts import EPISODE_COUNTS, SCENE_COUNTS, scene_counts
+from care_sim.evaluation.counts import EPISODE_COUNTS, NEEDLESS, SCENE_COUNTS, scene_counts
 from care_sim.evaluation.smallest_budget import (
     BUDGETS,
     Counts,
@@ -25,6 +25,7 @@ from care_sim.evaluation.smallest_budget import (
     SmallestBudget,
     reaching,
     resampled_budgets,
+    shares,
     smallest_budget,
 )
 from care_sim.policies import tags_of
@@ -161,15 +162,22 @@ class BudgetResult:
     @property
     def held_back_by(self) -> str:
         """The count that reaches 90% last, with its part where there are several, and how many more
-        reach it no earlier. Empty if the smallest budget is enough.
+        reach it no earlier. Of counts that never reach it, the one with the least share at the
+        largest budget, and this share. Empty if the smallest budget is enough.
         """
         names = [(part, name) for part in self.parts for name in COUNTS[part]]
         needed = reaching(self.counts)
-        last = np.flatnonzero(needed == needed.max()).tolist()
         if needed.max() <= BUDGETS[0]:
             return ""
-        part, name = names[last[0]]
+        last = np.flatnonzero(needed == needed.max())
+        levels = shares(self.counts)[-1, last]
+        is_never = np.isinf(needed.max())
+        place = levels.argmin() if is_never else 0
+        part, name = names[last[place]]
         text = f"{part}: {name}" if len(self.parts) > 1 else name
+        # Needless stops are no share of anything.
+        if is_never and name != NEEDLESS:
+            text = f"{text}, {levels[place]:.0%} at {BUDGETS[-1]:.0%}"
         return f"{text} (+{len(last) - 1})" if len(last) > 1 else text
 
     def cut_to(self, worlds: Iterable[tuple[str, int | str]]) -> "BudgetResult | None":
