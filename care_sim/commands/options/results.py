@@ -54,7 +54,8 @@ class Benchmark(WorkerOptions):
     """Name of the entry in tables, if a single policy is played."""
     detector: str = "centerpoint"
     """The detector. Entries are ranked under centerpoint. Published entries on streets are printed
-    beside results under megvii, pointrcnn and returns, too."""
+    beside results under megvii, pointrcnn and returns too, and with --quick under cluster and
+    pillars."""
     detector_parameters: tuple[str, ...] = ()
     """Parameters of the detector as NAME=VALUE. Published entries have none."""
     closed_loop: Flag = False

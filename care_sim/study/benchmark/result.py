@@ -247,6 +247,6 @@ def write_list(path: Path, results: Sequence[BudgetResult]) -> None:
 
 
 # By the text, since every file that the leaderboard reads is compared with the published entries.
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=8)
 def _parsed_list(text: str, origin: str) -> tuple[BudgetResult, ...]:
     return tuple(result_of(content, origin) for content in parsed_json(text))
