@@ -91,8 +91,8 @@ MOST_KINDS = 256
 
 
 class StandIn(NamedTuple):
-    """Stand-ins of a body: PyBullet's number of the shape of each of its n parts, and the boxes of
-    the parts, (n, 6) centre and size in the frame of the body.
+    """Stand-ins of a body: its n parts as PyBullet's numbers of their shapes, and as boxes (n, 6),
+    centre and size in the frame of the body.
     """
 
     shapes: list[int]
