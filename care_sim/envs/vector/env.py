@@ -229,6 +229,8 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         self, who: Mask, seeds: Sequence[int | None], infos: dict[str, Any]
     ) -> dict[str, Any]:
         """Begin episodes in the worlds `who`, and add their infos."""
+        if not who.any():
+            return infos
         self._begun[who] = False
         own = {world: entropy_of(self._seeded[world], seeds[world]) for world in _places(who)}
         for world, info in self._worlds.begin(own).items():
