@@ -25,11 +25,11 @@ class Threads:
         """Run `kernel(live, *given)`, which works on the rows of the worlds that are `live` (W,)
         alone. Every thread takes some of these worlds.
         """
-        worlds = np.flatnonzero(live)
-        count = min(self._count, len(worlds))
+        count = min(self._count, int(np.count_nonzero(live)))
         if count < 2:
             kernel(live, *given)
             return
+        worlds = np.flatnonzero(live)
         parts = np.zeros((count, len(live)), np.bool_)
         parts[np.arange(len(worlds)) * count // len(worlds), worlds] = True
         submit = self._executor().submit

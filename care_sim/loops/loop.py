@@ -186,13 +186,11 @@ class Loop:
         """
         # No cell outside its hull can hit it, so these stand for all.
         state = self.state
-        nothing = np.empty(0, np.int64)
-        cells = [
-            self.rig.hulls(seen_by(state.sensors, w, state.bodies.boxes[w, bodies[w]][None]))[0]
-            if who[w]
-            else nothing
-            for w in range(len(who))
-        ]
+        cells = [np.empty(0, np.int64)] * len(who)
+        asked = np.flatnonzero(who).tolist()
+        boxes = [seen_by(state.sensors, w, state.bodies.boxes[w, bodies[w]][None]) for w in asked]
+        for world, hull in zip(asked, self.rig.hulls(np.array(boxes)), strict=True):
+            cells[world] = hull
         hits = self.scanning.hits(state, who, bodies, Fired.of(cells))
         enough: Mask = who & (hits >= self.conditions.min_returns)
         return enough
