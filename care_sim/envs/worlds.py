@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.base.threads import ALONE, Threads
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.conditions import ClosedLoopConditions
@@ -89,7 +90,7 @@ class History:
 class Stepped(NamedTuple):
     """Result of a step of n worlds. Rewards, terminations and truncations (n,) are 0 and False for
     worlds that did not play. `columns` (n, ...) hold the part of `info` that all worlds have, by
-    name; the next step may write over them. `single` holds the part of one world alone, by world.
+    name. `single` holds the part of one world alone, by world.
     """
 
     rewards: Floats
@@ -105,8 +106,8 @@ class Worlds:
     keyframe into its row of `observed`.
 
     Unless `exact`, clearances that no reward needs are bounds (`Loop`); outcomes are exact.
-    `one_budget` says whether all worlds of the vector environment, in all threads, fire equally
-    many cells. Infos then hold the cells as one array, else as one array per world.
+    Where all worlds fire equally many cells (`has_one_budget`), infos hold the cells as one array,
+    else as one array per world.
     """
 
     records: Records
@@ -118,7 +119,7 @@ class Worlds:
         choice: Choice,
         observed: Observed | None = None,
         exact: bool = True,
-        one_budget: bool = True,
+        threads: Threads = ALONE,
     ):
         worlds = len(settings)
         # Settings that all worlds share are read from world 0.
@@ -127,11 +128,12 @@ class Worlds:
         self._exact = exact
         rigs, conditions = [each.rig for each in settings], [each.conditions for each in settings]
         self._choice = choice
-        self._one_budget = one_budget
+        self.has_one_budget = len({rig.budget for rig in rigs}) == 1
         duration_s = first.scenario.duration_s
         detectors = [each.detector for each in settings]
         exact_below_m = np.inf if exact else KEEP_CLEAR_M
-        self.loop = Loop(rigs, conditions, duration_s, detectors, observed, exact_below_m)
+        given = detectors, observed, exact_below_m, threads
+        self.loop = Loop(rigs, conditions, duration_s, *given)
         self.observed = self.loop.observed
         self._rewards = Rewards(first.weights, worlds)
         self._history = History(worlds, most_keyframes(duration_s, first.rig.keyframe_s))
@@ -178,18 +180,17 @@ class Worlds:
         budgets differ.
         """
         conditions, worlds = self._first.conditions, len(self._settings)
-        # There are columns even where nobody plays, to be joined with those of other threads.
         kinds: dict[str, type] = {"fired": np.int64}
         kinds |= {"intensities": np.float64} if conditions.shapes_beams else {}
         kinds |= {"times_s": np.float64} if conditions.lidar_sweep_s else {}
-        shape = (worlds, self._first.rig.budget) if self._one_budget else (worlds,)
+        shape = (worlds, self._first.rig.budget) if self.has_one_budget else (worlds,)
         columns: dict[str, NDArray[Any]] = {
-            name: np.zeros(shape, kind if self._one_budget else object)
+            name: np.zeros(shape, kind if self.has_one_budget else object)
             for name, kind in kinds.items()
         }
         for world, own in told.items():
             for name, column in columns.items():
-                column[world] = own[name] if self._one_budget else own[name].copy()
+                column[world] = own[name] if self.has_one_budget else own[name].copy()
         return columns
 
     def _played(self, fired: Fired, who: Mask) -> Stepped:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from care_sim.base.threads import ALONE, Threads
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.rig import Rig
@@ -38,7 +39,7 @@ class Loop:
     `detectors` (W,), or where all are None, the paper's proxy detects what enough rays hit.
 
     Clearances of `exact_below_m` or more are bounds, as of `Motion.advance`; `motion.settle`
-    returns the least of an episode.
+    returns the least of an episode. Scans and pictures are made on `threads`.
     """
 
     fired: Fired
@@ -58,6 +59,7 @@ class Loop:
         detectors: Sequence[Detector | None] = (),
         observed: Observations | None = None,
         exact_below_m: float = np.inf,
+        threads: Threads = ALONE,
     ):
         worlds = len(rigs)
         self.rig = rig = rigs[0]
@@ -66,14 +68,14 @@ class Loop:
         self.state = state = State(worlds)
         limits = Limits(rig)
         self.locating = Locating(rig, common, limits.ego, state)
-        self.scanning = Scanning(rig, common, worlds)
+        self.scanning = Scanning(rig, common, worlds, threads)
         self._detecting = Detecting(rigs, detectors or [None] * worlds, common.min_returns)
         self._tracking = Tracking(rig.keyframe_s, common.velocity_keyframes)
         self.driving = Driving(rig, common, worlds)
         self._judging = Judging(rig, common, self.driving, worlds)
         self._exact_below_m = exact_below_m
         self.motion = Motion(worlds, steps_of(duration_s, rig.keyframe_s))
-        self.sight = Seeing(rig, conditions)
+        self.sight = Seeing(rig, conditions, threads)
         self.observing = Observing(limits, np.array([each.budget for each in rigs]))
         self._in_view = np.zeros(worlds, np.bool_)
         self._reads_worlds = (
@@ -184,13 +186,11 @@ class Loop:
         """
         # No cell outside its hull can hit it, so these stand for all.
         state = self.state
-        nothing = np.empty(0, np.int64)
-        cells = [
-            self.rig.hulls(seen_by(state.sensors, w, state.bodies.boxes[w, bodies[w]][None]))[0]
-            if who[w]
-            else nothing
-            for w in range(len(who))
-        ]
+        cells = [np.empty(0, np.int64)] * len(who)
+        asked = np.flatnonzero(who).tolist()
+        boxes = [seen_by(state.sensors, w, state.bodies.boxes[w, bodies[w]][None]) for w in asked]
+        for world, hull in zip(asked, self.rig.hulls(np.array(boxes)), strict=True):
+            cells[world] = hull
         hits = self.scanning.hits(state, who, bodies, Fired.of(cells))
         enough: Mask = who & (hits >= self.conditions.min_returns)
         return enough

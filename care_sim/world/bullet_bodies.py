@@ -143,11 +143,6 @@ class BulletBodies:
         # A copy has its own client, which is still empty.
         return vars(self) | {"_numbers": {}, "_moved": set(self._shapes)}
 
-    @property
-    def made(self) -> int:
-        """The number of bodies that PyBullet has."""
-        return len(self._numbers)
-
     def add(self, parts: Sequence[Part], seen: Sequence[Part], group: int) -> int:
         """Add a body of `parts`, of which cameras see `seen`, and return its id."""
         body = self._count
@@ -176,19 +171,6 @@ class BulletBodies:
         ids[list(self._numbers.values())] = list(self._numbers)
         return np.asarray(ids[numbers])
 
-    def put(self, body: int, pose: Sequence[float]) -> int:
-        """Pass a body to PyBullet at `pose` (x, y, z and the quaternion x, y, z, w) and return its
-        number.
-        """
-        if body not in self._numbers:
-            self._numbers[body] = self._make(self._shapes[body])
-        number = self._numbers[body]
-        pybullet.resetBasePositionAndOrientation(
-            number, pose[:3], pose[3:], physicsClientId=self._client.number
-        )
-        self._moved.discard(body)
-        return number
-
     def clearance(self, number: int, other: int, within: float) -> float:
         """Return the smallest distance between two hulls, given by PyBullet's numbers. See
         `care_sim.world.bullet.BulletWorld.clearance`.
@@ -204,13 +186,19 @@ class BulletBodies:
         # A copy: `moved` may be the very set that shrinks here. In the order of ids, so that what
         # PyBullet holds depends on no order of a set.
         for body in sorted(moved):
-            self.put(body, poses[body].tolist())
+            if body not in self._numbers:
+                self._numbers[body] = self._make(self._shapes[body])
+            pose = poses[body].tolist()
+            pybullet.resetBasePositionAndOrientation(
+                self._numbers[body], pose[:3], pose[3:], physicsClientId=self._client.number
+            )
+            self._moved.discard(body)
 
     def _make(self, body: _Shape) -> int:
         # Mass 0: bodies stand where they are put, and nothing ever falls or is pushed.
         number = pybullet.createMultiBody(
             0,
-            self._collision_shape(body.parts),
+            make_collision_shape(body.parts, self._client.number),
             self._visual_shape(body.seen) if body.seen else self._no_visual_shape(),
             physicsClientId=self._client.number,
         )
@@ -231,12 +219,6 @@ class BulletBodies:
             number, -1, group, group, physicsClientId=self._client.number
         )
 
-    def _collision_shape(self, parts: Sequence[Part]) -> int:
-        shapes = _collision(parts)
-        return int(
-            pybullet.createCollisionShapeArray(physicsClientId=self._client.number, **shapes)
-        )
-
     def _visual_shape(self, parts: Sequence[Part]) -> int:
         return int(
             pybullet.createVisualShapeArray(physicsClientId=self._client.number, **_visual(parts))
@@ -247,6 +229,12 @@ class BulletBodies:
         return self._visual_shape(
             [Part("box", (1e-4, 1e-4, 1e-4), (0.0, 0.0, -1e4), (0.0, 0.0, 0.0))]
         )
+
+
+def make_collision_shape(parts: Sequence[Part], client: int) -> int:
+    """Make a shape of `parts` in a client, and return PyBullet's number of the shape."""
+    shapes = _collision(parts)
+    return int(pybullet.createCollisionShapeArray(physicsClientId=client, **shapes))
 
 
 def _collision(parts: Sequence[Part]) -> dict[str, Any]:

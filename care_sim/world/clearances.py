@@ -6,7 +6,7 @@ lower bound, and PyBullet computes only the moments that matter.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
@@ -74,38 +74,43 @@ class Clearances:
         recent = steps[:, None] - np.arange(count)
         bounds = self._bounds[np.arange(len(steps))[:, None], recent]
         least: Floats = bounds.min(axis=1)
-        for world in np.flatnonzero(live & (least <= exact_below) & (least < np.inf)).tolist():
-            order = np.argsort(bounds[world])
-            moments = recent[world, order].tolist(), bounds[world, order].tolist()
-            least[world] = self._least(world, *moments, exact_below)
+        asked = np.flatnonzero(live & (least <= exact_below) & (least < np.inf)).tolist()
+        if not asked:
+            return least
+        judge = borrow_judge()
+        for world in asked:
+            moments = zip(bounds[world].tolist(), recent[world].tolist(), strict=True)
+            least[world] = self._least(judge, world, moments, exact_below)
         return least
 
     def least(self, world: int, begin: int, end: int) -> float:
         """Return the least clearance of a world from its step `begin` to the one before `end`."""
-        bounds = self._bounds[world, begin:end]
-        order = np.argsort(bounds)
-        return self._least(world, (begin + order).tolist(), bounds[order].tolist(), math.inf)
+        moments = zip(self._bounds[world, begin:end].tolist(), range(begin, end), strict=True)
+        return self._least(borrow_judge(), world, moments, math.inf)
 
     def _least(
-        self, world: int, steps: Sequence[int], bounds: Sequence[float], exact_below: float
+        self,
+        judge: ClearanceJudge,
+        world: int,
+        moments: Iterable[tuple[float, int]],
+        exact_below: float,
     ) -> float:
-        """Return the least clearance at some `steps`, whose `bounds` ascend."""
+        """Return the least clearance at some `moments`: lower bounds and steps."""
         # Begin with the smallest bound. Moments with a bound above the smallest distance so far
         # need no exact distance.
         least = math.inf
-        for step, bound in zip(steps, bounds, strict=True):
+        for bound, step in sorted(moments):
             if bound > least or bound == math.inf:
                 break
             if bound > exact_below:
                 return min(least, bound)
-            least = min(least, self._exact(world, step))
+            least = min(least, self._exact(judge, world, step))
         return least
 
-    def _exact(self, world: int, step: int) -> float:
+    def _exact(self, judge: ClearanceJudge, world: int, step: int) -> float:
         known = float(self._known[world, step])
         kinds, pair = self._kinds[world], self._pairs[world]
         if math.isnan(known) and kinds is not None:
-            judge = borrow_judge()
             if pair is None or pair[0] is not judge:
                 pair = self._pairs[world] = judge, judge.stand_ins(*kinds)
             known = judge.clearance(pair[1], self._poses[world, step])

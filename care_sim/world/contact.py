@@ -10,7 +10,7 @@ import numpy as np
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers
 from care_sim.world.bodies import BodyKind
-from care_sim.world.bullet_bodies import OPAQUE, BulletBodies, LentClient, pybullet
+from care_sim.world.bullet_bodies import LentClient, make_collision_shape, pybullet
 
 PADDING_M = 0.05
 """PyBullet's distances may be this much less than those of the exact hulls; 2 mm were seen."""
@@ -91,11 +91,11 @@ MOST_KINDS = 256
 
 
 class StandIn(NamedTuple):
-    """Stand-ins of a body: one body per part, and the boxes of the n parts, (n, 6) centre and size
-    in the frame of the body.
+    """Stand-ins of a body: its n parts as PyBullet's numbers of their shapes, and as boxes (n, 6),
+    centre and size in the frame of the body.
     """
 
-    bodies: list[int]
+    shapes: list[int]
     boxes: Floats
 
 
@@ -107,20 +107,20 @@ class ClearanceJudge:
     """Computes the clearance between an ego and another body, given by kinds and poses, with one
     PyBullet client for all worlds. Bit-identical to `BulletWorld.clearance`.
 
-    Each part is a body of its own in the client. PyBullet measures every pair of parts of two
+    Each part is a shape of its own in the client. PyBullet measures every pair of parts of two
     bodies, and most pairs are too far apart to matter. So only pairs that could be the nearest are
     measured.
     """
 
     def __init__(self) -> None:
         self._client = LentClient()
-        self._bodies = BulletBodies(self._client, ground=False)
-        self._egos: dict[BodyKind, StandIn] = {}
-        self._others: dict[BodyKind, StandIn] = {}
+        self._known: dict[BodyKind, StandIn] = {}
+        # This body is missing once other code has emptied the client.
+        pybullet.createMultiBody(physicsClientId=self._client.number)
 
     def stand_ins(self, ego: BodyKind, other: BodyKind) -> StandIns:
         """Return the stand-ins of an ego of one kind and of another body."""
-        return self._known(self._egos, ego), self._known(self._others, other)
+        return self._stand_in(ego), self._stand_in(other)
 
     def clearance(
         self,
@@ -135,14 +135,17 @@ class ClearanceJudge:
         places = np.asarray(poses, float)
         gaps, pairs = nearest_parts(ego.boxes, other.boxes, places)
         own, others = places.tolist()
+        # Bodies and links, of which there are none, then place and turn of each shape.
+        fixed = -1, -1, within, -1, -1
+        stances = own[:3], others[:3], own[3:], others[3:], self._client.number
         least = math.inf
         for gap, pair in zip(gaps.tolist(), pairs.tolist(), strict=True):
             if gap - PADDING_M > min(least, within):
                 break
-            part, there = divmod(pair, len(other.bodies))
-            number = self._bodies.put(ego.bodies[part], own)
-            other_number = self._bodies.put(other.bodies[there], others)
-            least = min(least, self._bodies.clearance(number, other_number, within))
+            part, there = divmod(pair, len(other.shapes))
+            shapes = ego.shapes[part], other.shapes[there]
+            for point in pybullet.getClosestPoints(*fixed, *shapes, *stances):
+                least = min(least, point[8])
         return least
 
     def touch(self, kinds: tuple[BodyKind, BodyKind], poses: Floats) -> bool:
@@ -156,23 +159,20 @@ class ClearanceJudge:
         """Return True while the judge holds few kinds and no other code has closed or emptied its
         client.
         """
-        made = self._bodies.made
-        if not made:
-            return not self._client.closed
         client = self._client.number
-        is_whole = pybullet.isConnected(client) and made == pybullet.getNumBodies(client)
-        return is_whole and len(self._egos) + len(self._others) < MOST_KINDS
+        is_whole = pybullet.isConnected(client) and pybullet.getNumBodies(client) == 1
+        return is_whole and len(self._known) < MOST_KINDS
 
     def close(self) -> None:
         """Free the simulator."""
         self._client.close()
 
-    def _known(self, known: dict[BodyKind, StandIn], kind: BodyKind) -> StandIn:
-        if kind not in known:
-            bodies = [self._bodies.add([part], (), OPAQUE) for part in kind.parts]
+    def _stand_in(self, kind: BodyKind) -> StandIn:
+        if kind not in self._known:
+            shapes = [make_collision_shape([part], self._client.number) for part in kind.parts]
             boxes = np.array([(*part.centre, *part.size) for part in kind.parts], float)
-            known[kind] = StandIn(bodies, boxes)
-        return known[kind]
+            self._known[kind] = StandIn(shapes, boxes)
+        return self._known[kind]
 
 
 class _Shared(threading.local):

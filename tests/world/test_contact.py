@@ -61,8 +61,8 @@ def test_of_bodies_that_lie_on_their_side_all_parts_are_asked_about(judge, x):
 
 def test_pybullet_is_asked_about_the_parts_that_could_be_the_nearest(judge, monkeypatch):
     asked = []
-    exactly = judge._bodies.clearance
-    monkeypatch.setattr(judge._bodies, "clearance", lambda *its: asked.append(1) or exactly(*its))
+    exactly = pybullet.getClosestPoints
+    monkeypatch.setattr(pybullet, "getClosestPoints", lambda *its: asked.append(1) or exactly(*its))
     pair = judge.stand_ins(CATALOGUE["ego"], CATALOGUE["pedestrian"])
     upright = [0.0, 0.0, 0.0, 1.0]
     near = [[0.0, 0.0, 0.0, *upright], [12.0, 0.0, 0.0, *upright]]

@@ -123,16 +123,6 @@ def last_rows(observation: Any, over: Mask) -> NDArray[np.object_]:
     return rows
 
 
-def joined(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """The columns of the shares of worlds, one after the other, in arrays of their own."""
-    return {
-        name: joined([part[name] for part in parts])
-        if isinstance(column, dict)
-        else np.concatenate([part[name] for part in parts])
-        for name, column in parts[0].items()
-    }
-
-
 def kept(columns: dict[str, Any], who: Mask) -> dict[str, Any]:
     """Return infos in the form of Gymnasium, from `columns` (W, ...) or dictionaries of them. Rows
     of the worlds `who` (W,) stay; other rows are 0 or None. Beside every name is a mask of these

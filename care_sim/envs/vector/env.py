@@ -1,21 +1,17 @@
 """The vector environments of the closed loop: thin Gymnasium adapters around `Worlds`."""
 
-import os
-from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor, wait
-from functools import partial
-from typing import Any, ClassVar, TypeVar
-from weakref import finalize
+from collections.abc import Sequence
+from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space, create_empty_array
-from numpy.typing import NDArray
 
 from care_sim.base.checks import as_array, check_flag, check_whole
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.limits import CORES
+from care_sim.base.threads import Threads
 from care_sim.base.vectors import shared_attribute
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.conditions import ClosedLoopConditions
@@ -26,7 +22,6 @@ from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.sensing import Observed, checked_scores, entropy_of
 from care_sim.envs.vector.arguments import (
     autoreset_of,
-    joined,
     kept,
     last_rows,
     makers_of,
@@ -37,45 +32,6 @@ from care_sim.envs.vector.arguments import (
 from care_sim.envs.worlds import Stepped, Worlds
 from care_sim.loops.stages.choice import Choice
 from care_sim.scenarios.base import Scenario
-
-_T = TypeVar("_T")
-
-
-class Threads:
-    """Up to `count` threads. They begin when they are first needed; none outlives this object."""
-
-    def __init__(self, count: int):
-        self._count = count
-        self._pool: ThreadPoolExecutor | None = None
-        self._process = -1
-        self._others: list[Future[Any]] = []
-
-    def all(self, tasks: Sequence[Callable[[], _T]]) -> list[_T]:
-        """Run all tasks and return their results. The calling thread runs the first task."""
-        if len(tasks) < 2:
-            return [task() for task in tasks]
-        # A fork copies no threads: in a new process they begin anew.
-        if self._pool is None or self._process != os.getpid():
-            self._pool = ThreadPoolExecutor(self._count - 1, "care-sim worlds")
-            self._process = os.getpid()
-            self._others = []
-            finalize(self, self._pool.shutdown, wait=False)
-        # An interrupt while waiting has left some tasks at work.
-        wait(self._others)
-        self._others = others = [self._pool.submit(task) for task in tasks[1:]]
-        # All are waited for, whatever one of them raises: no task outlives the call.
-        try:
-            first = tasks[0]()
-        finally:
-            wait(others)
-        return [first, *(other.result() for other in others)]
-
-    def close(self) -> None:
-        """End the threads; they begin again if they are needed."""
-        if self._pool is not None and self._process == os.getpid():
-            self._pool.shutdown()
-        self._pool = None
-
 
 MOST_WORLDS = 2**16
 MOST_THREADS = 1024
@@ -136,22 +92,21 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         self._models = models_of(makers_of(self.single, arguments, num_envs))
         # Settings that all worlds share are read from world 0.
         self._model = self._models[0]
-        self._one_budget = len({model.rig.budget for model in self._models}) == 1
         self.single_observation_space = self._model.observation_space
         self.single_action_space = self._model.action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
 
-        # Every thread has worlds of its own, and works on nothing else.
         rows: Any = create_empty_array(self.single_observation_space, num_envs)
         self._observed: Observed = rows
-        count = min(num_envs, threads)
-        ends = [num_envs * k // count for k in range(count + 1)]
-        self._shares = [slice(*ends[k : k + 2]) for k in range(count)]
-        self._worlds = [self._made(share) for share in self._shares]
+        settings = [model.setting for model in self._models]
+        self._threads = Threads(min(num_envs, threads))
+        choice = Choice([one.rig for one in settings], self._model.conditions, self._threads)
+        # Infos without clearances need few of them.
+        exact = self._model.scoring_info
+        self._worlds = Worlds(settings, choice, self._observed, exact, self._threads)
         # Each draws the seeds of its later episodes as the single environment does.
         self._seeded = [gymnasium.Env[Any, Any]() for _ in range(num_envs)]
-        self._threads = Threads(count)
         self._steps = np.zeros(num_envs, np.int64)
         self._over = np.zeros(num_envs, np.bool_)
         self._begun = np.zeros(num_envs, np.bool_)
@@ -237,7 +192,10 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
                 f"worlds {shown(_places(begins))} are over: call reset() with a reset_mask"
             )
         scores = checked_scores(as_array("actions", actions), self.action_space.shape or ())
-        stepped = self._played(scores, ~begins)
+        # An error leaves worlds at different keyframes: then all have to begin anew.
+        self._begun[:] = False
+        stepped = self._worlds.step(scores, ~begins)
+        self._begun[:] = True
         self._steps += ~begins
         stepped.truncated[:] |= ~begins & (self._steps >= self._most_steps)
         over = stepped.terminated | stepped.truncated
@@ -261,66 +219,22 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
     def close_extras(self, **_: Any) -> None:
         """Free the worlds and end the threads."""
         self._threads.close()
-        for worlds in self._worlds:
-            worlds.close()
-
-    def __getstate__(self) -> dict[str, Any]:
-        return vars(self) | {"_threads": None}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state)
-        self._threads = Threads(len(self._shares))
-        # The worlds of a copy, too, write into rows of its returned observations.
-        for worlds, share in zip(self._worlds, self._shares, strict=True):
-            worlds.observed.update(_rows(self._observed, share))
+        self._worlds.close()
 
     def _check_open(self) -> None:
         if self.closed:
             raise gymnasium.error.ClosedEnvironmentError("the environment is closed: make another")
 
-    def _made(self, share: slice) -> Worlds:
-        rows = _rows(self._observed, share)
-        settings = [model.setting for model in self._models[share]]
-        choice = Choice([one.rig for one in settings], self._model.conditions)
-        # Infos without clearances need few of them.
-        return Worlds(settings, choice, rows, self._model.scoring_info, self._one_budget)
-
-    def _played(self, scores: NDArray[np.float32], who: Mask) -> Stepped:
-        # An error leaves worlds at different keyframes: then all have to begin anew.
-        self._begun[:] = False
-        parts = self._threads.all(
-            [
-                partial(worlds.step, scores[share], who[share])
-                for worlds, share in zip(self._worlds, self._shares, strict=True)
-            ]
-        )
-        self._begun[:] = True
-        rewards, terminated, truncated = (
-            np.concatenate(column) for column in zip(*(part[:3] for part in parts), strict=True)
-        )
-        return Stepped(
-            rewards,
-            terminated,
-            truncated,
-            joined([part.columns for part in parts]),
-            {
-                share.start + world: info
-                for share, part in zip(self._shares, parts, strict=True)
-                for world, info in part.single.items()
-            },
-        )
-
     def _begin(
         self, who: Mask, seeds: Sequence[int | None], infos: dict[str, Any]
     ) -> dict[str, Any]:
         """Begin episodes in the worlds `who`, and add their infos."""
+        if not who.any():
+            return infos
         self._begun[who] = False
-        # One share after the other: this is Python nearly alone, and threads would take turns.
-        for worlds, share in zip(self._worlds, self._shares, strict=True):
-            numbers = {world: share.start + world for world in _places(who[share])}
-            own = {world: entropy_of(self._seeded[n], seeds[n]) for world, n in numbers.items()}
-            for world, info in (worlds.begin(own) if own else {}).items():
-                infos = self._add_info(infos, info, share.start + world)
+        own = {world: entropy_of(self._seeded[world], seeds[world]) for world in _places(who)}
+        for world, info in self._worlds.begin(own).items():
+            infos = self._add_info(infos, info, world)
         self._over[who] = False
         self._steps[who] = 0
         self._begun[who] = True
@@ -338,7 +252,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         self, vector_infos: dict[str, Any], env_info: dict[str, Any], env_num: int
     ) -> dict[str, Any]:
         # Gymnasium takes all arrays of a name for equally long, unless their column is of objects.
-        if not self._one_budget:
+        if not self._worlds.has_one_budget:
             for name, value in env_info.items():
                 if isinstance(value, np.ndarray):
                     vector_infos.setdefault(name, np.full(self.num_envs, None, object))
@@ -348,10 +262,6 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         if not self.copy:
             return self._observed
         return {name: values.copy() for name, values in self._observed.items()}
-
-
-def _rows(observed: Observed, share: slice) -> Observed:
-    return {name: values[share] for name, values in observed.items()}
 
 
 def _places(who: Mask) -> list[int]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
+from care_sim.base.threads import ALONE, Threads
 from care_sim.core.arrays import Integers, Mask
 from care_sim.core.conditions import Conditions
 from care_sim.core.defaults import CELLS
@@ -24,14 +25,15 @@ _NOTHING = np.empty(0, np.int64)
 
 class Choice:
     """Chooses the cells that the LiDARs of W worlds fire. The `rigs` of the worlds differ at most
-    in budget and camera. The `conditions` give the floor.
+    in budget and camera. The `conditions` give the floor. The worlds are shared by `threads`.
     """
 
-    def __init__(self, rigs: Sequence[Rig], conditions: Conditions):
+    def __init__(self, rigs: Sequence[Rig], conditions: Conditions, threads: Threads = ALONE):
         rig, worlds = rigs[0], len(rigs)
         self._budgets = np.array([each.budget for each in rigs])
         most = int(self._budgets.max())
         self._conditions = conditions
+        self._threads = threads
         self._rig = rig
         self._is_free = rig.firing == CELLS
         # The keys of the floors.
@@ -56,8 +58,10 @@ class Choice:
         if not self._is_free:
             return Fired.of(self._in_units(scores, live, keyframes))
         flat = scores.reshape(len(scores), -1)
+        self._fired.counts[~live] = 0
         floors = self._conditions.floor, self._keys
-        _fire(flat, live, keyframes, self._budgets, *floors, self._cells, self._fired)
+        given = flat, keyframes, self._budgets, *floors, self._cells, self._fired
+        self._threads.share(_fire, live, *given)
         return self._fired
 
     def would_fire(self, world: int, scores: NDArray[np.float32], keyframe: int) -> Cells:
@@ -81,8 +85,8 @@ class Choice:
 
 @compiled()
 def _fire(
-    scores: NDArray[np.float32],
     live: Mask,
+    scores: NDArray[np.float32],
     keyframes: Integers,
     budgets: Integers,
     has_floor: bool,
@@ -90,12 +94,10 @@ def _fire(
     units: Cells,
     fired: Fired,
 ) -> None:
-    """Fill `fired`; see `Choice.fired`."""
+    """Fill `fired` of the worlds that are `live`; see `Choice.fired`."""
     chosen = np.empty(scores.shape[1], np.bool_)
     for world in range(len(scores)):
-        count = 0
         if live[world]:
             floor = Floor(keys[world, 0], keys[world, 1], keyframes[world])
             given = scores[world], budgets[world], has_floor, floor, units
-            count = fire_free(*given, chosen, fired.cells[world])
-        fired.counts[world] = count
+            fired.counts[world] = fire_free(*given, chosen, fired.cells[world])

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
+from care_sim.base.threads import Threads
 from care_sim.core.arrays import Floats, Integers, Mask, filled
 from care_sim.core.belief import lay_ranges
 from care_sim.core.cells.boxes import GridSpacing
@@ -56,13 +57,16 @@ def lidar_of(world: World, rig: Rig, sensing: Sensing, seed: np.random.SeedSeque
 
 
 class Scanning:
-    """The LiDARs of `worlds` worlds. Returned arrays are reused at the next keyframe."""
+    """The LiDARs of `worlds` worlds, which `threads` share. Returned arrays are reused at the next
+    keyframe.
+    """
 
     scans: list[Scan | None]
     """(W,) of LiDARs that fire world by world, all that they measured at the last keyframe."""
 
-    def __init__(self, rig: Rig, sensing: Sensing, worlds: int):
+    def __init__(self, rig: Rig, sensing: Sensing, worlds: int, threads: Threads):
         grid = rig.grid
+        self._threads = threads
         self._rig = rig
         self._sensing = sensing
         self._reach = float(grid.range_m)
@@ -103,22 +107,32 @@ class Scanning:
     def _cast(self, state: State, live: Mask, fired: Fired, ranges: Floats, ids: Integers) -> None:
         """Fill `ranges` and `ids` (W, F) with what cells meet in the worlds that are `live`."""
         tables = state.sensors, state.solids, state.bodies
-        _scan(live, fired, *tables, self._fan, self._spacing, self._reach, ranges, ids)
+        given = fired, *tables, self._fan, self._spacing, self._reach, ranges, ids
+        self._threads.share(_scan, live, *given)
 
     def _one_by_one(self, state: State, fired: Fired) -> Returns:
+        found: list[Integers] = [fired.counts] * state.worlds
+        self._threads.share(self._fire, state.live, state, fired, found)
         counts, cells, ranges, ids = self._returns
         for world in np.flatnonzero(state.live).tolist():
-            lidar = self._lidars[world]
-            assert lidar is not None
-            asked = fired.cells[world, : fired.counts[world]]
-            scan, bodies = lidar.fire(asked, state.sensors.frame(world))
-            self.scans[world] = scan
+            scan, bodies = self.scans[world], found[world]
+            assert scan is not None
             counts[world] = len(bodies)
             cells = filled(cells, world, scan.cells)
             ranges = filled(ranges, world, scan.ranges)
             ids = filled(ids, world, bodies)
         self._returns = Returns(counts, cells, ranges, ids)
         return self._returns
+
+    def _fire(self, live: Mask, state: State, fired: Fired, found: list[Integers]) -> None:
+        """Scan the worlds that are `live` (W,), and put the bodies of their returns into `found`
+        (W,).
+        """
+        for world in np.flatnonzero(live).tolist():
+            lidar = self._lidars[world]
+            assert lidar is not None
+            asked = fired.cells[world, : fired.counts[world]]
+            self.scans[world], found[world] = lidar.fire(asked, state.sensors.frame(world))
 
     def lidar(self, world: int) -> Lidar | None:
         """The LiDAR of a world that fires alone, else None."""
@@ -149,7 +163,8 @@ class Scanning:
         the reach where nothing returned, 0 of cells that were not fired.
         """
         counts, cells, ranges, _ = returns
-        _lay_images(live, counts, cells, ranges, self._reach, out.reshape(len(out), -1))
+        given = counts, cells, ranges, self._reach, out.reshape(len(out), -1)
+        self._threads.share(_lay_images, live, *given)
 
 
 @compiled()

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
+from care_sim.base.threads import Threads
 from care_sim.core.arrays import Floats, Integers, Mask, longer
 from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.conditions import IDEAL_CAMERA, CameraFaults, Sensing
@@ -81,14 +82,15 @@ def has_own_detector(conditions: Sensing) -> bool:
 
 
 class Seeing:
-    """The cameras of all worlds, which differ in their `conditions` alone.
+    """The cameras of all worlds, which differ in their `conditions` alone. Shared by `threads`.
 
     Returned arrays are reused at the next keyframe.
     """
 
-    def __init__(self, rig: Rig, conditions: Sequence[Sensing]):
+    def __init__(self, rig: Rig, conditions: Sequence[Sensing], threads: Threads):
         models = rig.camera_models
         self._rig = rig
+        self._threads = threads
         self._conditions = conditions
         self.own = np.array([has_own_detector(each) for each in conditions])
         """(W,) where detections come from a `CameraDetector` of the world."""
@@ -148,7 +150,8 @@ class Seeing:
         shown = self._shown
         shown[state.live] = False
         # Another engine draws its own pictures, world by world.
-        _look(
+        self._threads.share(
+            _look,
             state.live & self._is_fast,
             self._cameras,
             state.sensors,

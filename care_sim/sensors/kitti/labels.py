@@ -88,17 +88,18 @@ def labels_of(
     """
     detections = seen.detections
     kinds = KINDS[detections.classes]
-    whole, pixels = np.empty((2, len(seen), 4))
-    limits = np.empty((len(seen), 4))
+    scales = np.array([focal_px / camera.focal for camera in cameras])[detections.cameras, None]
+    sizes = np.array([(camera.width, camera.height) * 2 for camera in cameras])
+    whole = np.empty((len(seen), 4))
     metres, depths = np.empty((2, len(seen)))
-    for number, camera in enumerate(cameras):
+    for number in set(detections.cameras.tolist()):
+        camera = cameras[number]
         (own,) = np.nonzero(detections.cameras == number)
-        scale = focal_px / camera.focal
-        whole[own] = np.nan_to_num(camera.project_boxes(boxes[own])) * scale
-        pixels[own] = detections.boxes[own] * scale
-        limits[own] = np.tile([camera.width * scale, camera.height * scale], 2)
+        whole[own] = camera.project_boxes(boxes[own])
         away = boxes[own, :3] - camera.position
         metres[own], depths[own] = np.hypot(away[:, 0], away[:, 1]), away @ camera.axes[0]
+    whole = np.nan_to_num(whole) * scales
+    limits = sizes[detections.cameras] * scales
     clipped = np.clip(whole, 0.0, limits)
     cut = whole != clipped
     areas = box_areas(clipped)
@@ -109,7 +110,7 @@ def labels_of(
         kinds,
         narrowed,
         cut,
-        _levels(seen, pixels, areas),
+        _levels(seen, detections.boxes * scales, areas),
         1 - areas / np.maximum(box_areas(whole), 1.0),
         metres,
         covered(narrowed, depths, detections.cameras),
