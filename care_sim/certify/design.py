@@ -97,6 +97,18 @@ CERTIFIED_FAULTS: dict[str, dict[str, Any]] = {
         "ego_yaw_sigma_deg": 1.0,
         "ego_pose_correlation_s": 1.0,
     },
+    "crosstalk": {"lidar_crosstalk": 0.1},
+    "weather": {
+        "lidar_stated_range_m": 40.0,
+        "lidar_stated_reflectance": 0.2,
+        "visibility_m": 200.0,
+        "rain_mm_h": 20.0,
+    },
+    "beams": {
+        "lidar_divergence_mrad": 3.0,
+        "lidar_returns": "both",
+        "lidar_sweep_s": 0.1,
+    },
 }
 """Faults of `care_sim.core.conditions`, strong enough to act within a few keyframes."""
 CERTIFIED_CAMERAS: dict[str, dict[str, Any]] = {
@@ -164,6 +176,8 @@ CERTIFIED_WORLDS: dict[str, tuple[dict[str, Any], ...]] = {
 _CLOSED_ALONE = (
     "camera_rotation_sigma_deg",
     "camera_position_sigma_m",
+    "weather",
+    "beams",
     "engine",
     "keyframe_s",
     "reward_weights",
@@ -172,10 +186,10 @@ _CLOSED_ALONE = (
 CERTIFIED_WITHOUT: dict[str, tuple[str, ...]] = {
     STREET: _CLOSED_ALONE,
     REPLAY: _CLOSED_ALONE,
-    DRIVE: ("yolox",),
+    DRIVE: ("engine",),
 }
-"""Choices that an environment does not have. `yolox` takes false boxes from another drive, which
-takes Bullet a minute.
+"""Choices that an environment does not have. Bullet needs minutes for some drives, since false
+boxes come from another whole drive.
 """
 
 _CLOSED_KEYFRAMES = (*(4,) * 7, *(6,) * 4, *(8,) * 5, 12, 12, 16, 60)
