@@ -53,7 +53,7 @@ ALTERNATIVES = (
     {*CERTIFIED_POLICIES},
     *({*group} for group, numbers in CERTIFIED_CHOICES if max(numbers) == 1),
 )
-"""Parts of which an episode has one at most."""
+"""An episode has one part of each group at most."""
 LEFT_OUT = {
     "detector_parameters": "the defaults alone",
     "presence": "decides which objects are counted, nothing that is played",
@@ -86,7 +86,7 @@ DETECTORS_LEFT_OUT = {
 
 
 def parts(episode):
-    """What pairs are made of: an environment, a policy and choices."""
+    """Return the environment, the policy and the choices of an episode."""
     given = dict(episode.arguments).items()
     chosen = [name for name, choice in CHOICES.items() if choice.items() <= given]
     return sorted([episode.environment, episode.policy, *chosen])
