@@ -5,5 +5,5 @@ published trails are `published.parquet`, which `published` reads.
 """
 
 ALL_EPISODES = 10_000
-CERTIFIED_EPISODES = 3_050
-"""Episodes played by default. With 32 policies the last pair meets in number 3,020."""
+CERTIFIED_EPISODES = 3_600
+"""Episodes played by default. With 38 policies the last pair meets in number 3,559."""

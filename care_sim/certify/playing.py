@@ -139,16 +139,17 @@ def trails_of(
 
 
 def episode_batches(episodes: Sequence[Drawn]) -> list[list[Drawn]]:
-    """Episodes in lists that are played one after the other: all of a street together, since it
-    takes seconds to make.
+    """Episodes in lists that are played one after the other: all of a street's film together, since
+    it takes seconds to make.
     """
-    streets: dict[int, list[Drawn]] = {}
+    films: dict[tuple[int, bool], list[Drawn]] = {}
     for episode in (one for one in episodes if one.environment == STREET):
-        streets.setdefault(episode.seed, []).append(episode)
+        film = episode.seed, "clutter" in dict(episode.arguments)
+        films.setdefault(film, []).append(episode)
     others = [one for one in episodes if one.environment != STREET]
     # Streets come first, so that no worker ends long after the others.
     return [
-        *streets.values(),
+        *films.values(),
         *(others[start : start + _BATCH] for start in range(0, len(others), _BATCH)),
     ]
 

@@ -127,12 +127,13 @@ def test_no_hash_seed_changes_a_trail(source):
     assert json.loads(done.stdout) == [known[number].hex() for number in numbers]
 
 
-def test_batches_hold_every_episode_once_and_a_street_together():
+def test_batches_hold_every_episode_once_and_a_film_together():
     made = episode_batches(LIST)
     assert sorted(episode.number for batch in made for episode in batch) == list(range(len(LIST)))
-    streets = [{e.seed for e in batch} for batch in made if batch[0].environment == STREET]
-    assert all(len(seeds) == 1 for seeds in streets)
-    assert len(streets) == len(design.STREETS)
+    streets = [batch for batch in made if batch[0].environment == STREET]
+    films = [{(e.seed, "clutter" in dict(e.arguments)) for e in batch} for batch in streets]
+    assert all(len(film) == 1 for film in films)
+    assert len(films) == 2 * len(design.STREETS)
 
 
 def test_an_episode_that_fails_is_told_and_leaves_the_others(source):

@@ -269,7 +269,7 @@ class Certify(WorkerOptions):
     """
 
     all: Flag = False
-    """All 10,000 episodes, not only the first 3,050."""
+    """All 10,000 episodes, not only the first 3,600."""
     episode: int | None = None
     """This episode alone, by its number in the list."""
 

@@ -27,7 +27,7 @@ def first_difference(number):
         conditions = rng.choice([*CONDITIONS.values(), *OWN.values()])
         # Parameters of the dense street's scenario are none of every other one's.
         arguments |= {name: v for name, v in conditions.items() if name not in OF_THE_SCENARIO}
-        if "camera_latency_s" in conditions:
+        if "camera_latency_s" in arguments:
             arguments.pop("camera_latency", None)
         if arguments.get("driver") == "careful-human":
             arguments = {name: v for name, v in arguments.items() if not name.startswith("brake_")}
