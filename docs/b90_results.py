@@ -24,7 +24,7 @@ from care_sim.core.conditions import RAYS
 from care_sim.evaluation.bootstrap import ratio_of_sums
 from care_sim.evaluation.counts import KEPT, SCENE_COUNTS
 from care_sim.evaluation.smallest_budget import BUDGETS, ENOUGH
-from care_sim.evaluation.strata import EMERGING
+from care_sim.evaluation.strata import EMERGING, ENTERING
 from care_sim.reports.budgets import (
     budget_tables,
     budgets_table,
@@ -102,6 +102,7 @@ MORE = [
     for entry in ideas.values()
     if entry not in REFERENCE_ENTRIES
 ]
+SMALL = BUDGETS[:4]
 WITH_RESIDUAL = (
     (WHOLE, WITHOUT[WHOLE]["residual"].name),
     ("care core-spread", "all-camera core-spread"),
@@ -160,6 +161,12 @@ def example_tables(example: BudgetResult, neighbours: Sequence[BudgetResult]) ->
     ]
 
 
+def with_fresh() -> list[BudgetResult]:
+    """Return the entries of `FRESH` on their streets and the published ones together."""
+    published = {one.entry: one.of_part(STREETS).rows for one in references(MAIN_DETECTOR)}
+    return [replace(one, rows=published[one.entry] + one.rows) for one in read_list(FRESH)]
+
+
 def statements(detectors: Sequence[str]) -> list[Table]:
     """Return the tables over those detectors that have played, on their common streets; none for
     one alone.
@@ -191,45 +198,43 @@ def conventions() -> Table:
 
 
 def small_budgets() -> Table:
-    """Return the table of what `WITH_RESIDUAL` detect on streets at small budgets, beside the same
-    policy without the residual: in % of a full scan's counts, and by how much more.
+    """Return the table of what `WITH_RESIDUAL` detect on streets at small budgets, in % of a full
+    scan's counts, and how many points more than the same policy without the residual.
     """
     columns = {
         detector: {one.entry.name: one.of_part(STREETS) for one in references(detector)}
         for detector in DETECTORS
     }
-    places = [SCENE_COUNTS.index(count) for count in (EMERGING, KEPT)]
-    rows = [
-        (
-            ours,
-            f"{100 * BUDGETS[budget]:g}%",
-            *(
+    rows = []
+    for pair in WITH_RESIDUAL:
+        for budget, share in enumerate(SMALL):
+            counts = [
                 cell
-                for place in places
-                for cell in _more(columns[MAIN_DETECTOR], (ours, theirs), budget, place)
-            ),
-            *(_more(own, (ours, theirs), budget, places[0])[-1] for own in [*columns.values()][1:]),
-        )
-        for ours, theirs in WITH_RESIDUAL
-        for budget in range(4)
+                for count in (EMERGING, ENTERING, KEPT)
+                for cell in _more(columns[MAIN_DETECTOR], pair, budget, count)
+            ]
+            others = [_more(columns[one], pair, budget, EMERGING)[-1] for one in DETECTORS[1:]]
+            rows.append((pair[0], f"{100 * share:g}%", *counts, *others))
+    heads = [
+        head
+        for count in (EMERGING, ENTERING, KEPT)
+        for head in (f"{count}, %", "without", "points more")
     ]
+    others = [f"{EMERGING}, points more, {detector}" for detector in DETECTORS[1:]]
     return Table(
         "The residual at small budgets, on streets",
-        (
-            *("policy", "budget"),
-            *(head for count in (EMERGING, KEPT) for head in (f"{count}, %", "without", "more")),
-            *(f"{EMERGING}, more, {detector}" for detector in DETECTORS[1:]),
-        ),
+        ("policy", "budget", *heads, *others),
         tuple(rows),
-        ("Counts in % of a full scan's. `more` is in points, paired over streets.",),
+        ("Counts in % of a full scan's. Differences are paired over streets.",),
         names=2,
     )
 
 
 def _more(
-    results: Mapping[str, BudgetResult], pair: tuple[str, str], budget: int, place: int
+    results: Mapping[str, BudgetResult], pair: tuple[str, str], budget: int, count: str
 ) -> tuple[str, ...]:
     """Return what two policies detect of a count in %, and the difference with its interval."""
+    place = SCENE_COUNTS.index(count)
     ours, theirs = (
         100 * np.array([row.got[budget][place] for row in results[name].rows]) for name in pair
     )
@@ -244,11 +249,11 @@ def summary_table() -> Table:
     of the tight tests, and that of the streets under each other detector that has played.
     """
     ordered = sorted_by_budget(references(MAIN_DETECTOR))
-    others = {TIGHT_TESTS: {one.entry: one for one in read_list(TIGHT)}} | {
-        detector: {one.entry: one for one in results}
-        for detector in (*DETECTORS[1:], *POINT_DETECTORS)
-        if (results := references(detector))
-    }
+    others = {TIGHT_TESTS: {one.entry: one for one in read_list(TIGHT)}}
+    for detector in (*DETECTORS[1:], *POINT_DETECTORS):
+        if results := references(detector):
+            fewer = f" ({len(results[0].rows)} streets)" if results[0].quick else ""
+            others[f"{detector}{fewer}"] = {one.entry: one for one in results}
     parts = ordered[0].parts
     rows = [
         (
@@ -288,7 +293,7 @@ def written() -> str:
         *trial(),
         budgets_table(read_list(TIGHT)),
         budgets_table(read_list(FRESH)),
-        statements_table({MAIN_DETECTOR: read_list(FRESH)}, ()),
+        statements_table({MAIN_DETECTOR: with_fresh()}, ()),
         *statements(DETECTORS),
         *statements((*DETECTORS, *POINT_DETECTORS)),
         small_budgets(),

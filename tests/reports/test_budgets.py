@@ -48,7 +48,7 @@ def test_the_smallest_budget_comes_first_with_what_holds_it_back():
             "3-4",
             "boxes",
             "never [never, never]",
-            "emerging, 50% at 20%",
+            "emerging, 50.0% at 20%",
             "never",
             *["≤0.5"] * 3,
             "never",
@@ -57,7 +57,7 @@ def test_the_smallest_budget_comes_first_with_what_holds_it_back():
             "3-4",
             "place",
             "never [never, never]",
-            "kept, 50% at 20% (+1)",
+            "kept, 50.0% at 20% (+1)",
             *["≤0.5"] * 2,
             *["never"] * 2,
             "never",
@@ -159,14 +159,14 @@ def test_parts_stand_side_by_side_and_the_worse_one_is_the_score():
         (
             "tuned-place",
             "never [never, never]",
-            "recorded: emerging, 50% at 20% (+3)",
+            "recorded: emerging, 50.0% at 20% (+3)",
             "≤0.5 [≤0.5, ≤0.5]",
             "never [never, never]",
         ),
         (
             "boxes",
             "never [never, never]",
-            "streets: emerging, 50% at 20% (+3)",
+            "streets: emerging, 50.0% at 20% (+3)",
             "never [never, never]",
             "≤0.5 [≤0.5, ≤0.5]",
         ),
@@ -202,7 +202,7 @@ def test_the_idea_that_is_worth_most_comes_first():
     assert [(row[0], *row[2:]) for row in table.rows] == [
         (
             "without camera",
-            "recorded: emerging, 50% at 20% (+3)",
+            "recorded: emerging, 50.0% at 20% (+3)",
             "never",
             "1.00 [1.00, 1.00]",
             "never",

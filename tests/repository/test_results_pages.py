@@ -144,17 +144,31 @@ def test_the_table_of_b90_is_that_of_the_published_entries():
     fresh = [one for one in read_list(script.FRESH) if one.entry.policy != "place"]
     told = [f"`{one.entry.name}` {format_budget(one.score.budget)}" for one in fresh]
     assert ", ".join(told) in page
+    orders = [
+        [one.entry for one in sorted_by_budget(own) if one.entry.policy != "tuned-place"]
+        for own in (fresh, [results[one.entry] for one in fresh])
+    ]
+    assert orders[0] == orders[1]
     assert [one.entry for one in sorted_by_budget(fresh)] == [one.entry for one in fresh]
     _, newest, *_ = script.trial()
     (worth,) = (row[4:] for row in newest.rows if row[0] == "without residual")
-    assert f"| `care-aimed`, 24 streets | {' | '.join(map(str, worth))} |" in page
-    rows_of = {row[:2]: row for row in script.small_budgets().rows}
-    *_, found, without, more, kept, kept_without = rows_of["care core-spread", "1%"][:7]
+    assert f"| `care-aimed` (on 24 streets) | {' | '.join(map(str, worth))} |" in page
+    small = script.small_budgets().rows
+    _, _, found, without, more, *_, kept, kept_without, _ = small[5][:11]
+    assert small[5][:2] == ("care core-spread", "1%")
     assert (
-        f"`care` detects {found}% of the emerging newcomers, and `all-camera` {without}% "
-        f"({more.replace(' ', ' points ', 1)}). `care` keeps {kept}% of the objects, `all-camera` "
-        f"{kept_without}%."
+        f"`care core-spread` detects {found}% of the emerging newcomers, and `all-camera "
+        f"core-spread` {without}% ({more.replace(' ', ' points ', 1)}). It keeps {kept}% of the "
+        f"objects, not {kept_without}%."
     ) in page
+    gains = [float(more.split()[0]) for row in small[5:] for more in (row[4], *row[11:])]
+    assert f"the gain is {min(gains):.0f} to {max(gains):.0f} points under the first four" in page
+    assert small[1][:2] == ("care-sector", "1%")
+    gain, loss = (float(small[1][column].split()[0]) for column in (4, 10))
+    assert f"the residual gains {gain} points at 1%, but {-loss} points fewer objects" in page
+    boxes = results[Entry("boxes")].counts[0]
+    emerging, _, kept, _ = boxes.got[:, 1].sum(axis=0) / boxes.full.sum(axis=0)
+    assert f"`boxes` detects {emerging:.0%} and keeps {kept:.0%}." in page
     # Ratios to other entries than the tables', and what a full scan has.
     rows, care, core_first, all_camera, whole, without = (
         next(one for one in ordered if one.entry == entry)
@@ -171,9 +185,16 @@ def test_the_table_of_b90_is_that_of_the_published_entries():
         for part in rows.parts
     ]
     beside += [(rows.counts, care.counts)]
+    told = []
     for pair in beside:
         ratio, low, high = budget_ratio(*pair)
-        tables += f"{ratio:.2f} [{low:.2f}, {high:.2f}]"
+        told.append(f"{ratio:.2f} [{low:.2f}, {high:.2f}]")
+    tables += " ".join(told)
+    for line, name in (
+        (3, "`care core-spread`, without: `all-camera core-spread`"),
+        (6, "`care-sector`"),
+    ):
+        assert f"| {name} | {' | '.join(told[line : line + 3])} |" in page
     ratios = re.findall(r"\d\.\d\d \[\d\.\d\d, \d\.\d\d\]", page)
     assert len(ratios) >= 5
     assert [ratio for ratio in ratios if ratio not in tables] == []

@@ -97,7 +97,7 @@ def test_a_file_holds_streets_and_drives(tmp_path, monkeypatch):
     content = json.loads((tmp_path / "mine.json").read_text())
     assert [*content["counts"]] == ["streets", "recorded ahead", "recorded"]
     assert content["b90_percent"][0] == "never"
-    assert content["held_back_by"] == "recorded ahead: emerging, 50% at 20% (+7)"
+    assert content["held_back_by"] == "recorded ahead: emerging, 50.0% at 20% (+7)"
     assert result.of_part(STREETS).score.budget < 0.03
     assert result.of_part(AHEAD).worlds == ((AHEAD, "kitti/0000"),)
 
@@ -109,11 +109,11 @@ def test_what_holds_an_entry_back_names_the_part_where_there_are_several():
     assert one.held_back_by == "kept"
     assert made_budgets("care", *curves, recorded=drives).held_back_by == "streets: kept"
     late = made_budgets("care", *curves, recorded=drives, later=NEVER)
-    assert late.held_back_by == "recorded: emerging, 50% at 20% (+3)"
+    assert late.held_back_by == "recorded: emerging, 50.0% at 20% (+3)"
     assert made_budgets("care", *[ALWAYS] * 4).held_back_by == ""
     # Of those that never get there, the one that is farthest away.
     low, lower = ([0.0] * 6 + [share] for share in (0.8, 0.6))
-    assert made_budgets("care", low, ALWAYS, lower, low).held_back_by == "kept, 60% at 20% (+2)"
+    assert made_budgets("care", low, ALWAYS, lower, low).held_back_by == "kept, 60.0% at 20% (+2)"
 
 
 def test_entries_share_the_full_scan():

@@ -169,16 +169,17 @@ class BudgetResult:
         needed = reaching(self.counts)
         if needed.max() <= BUDGETS[0]:
             return ""
-        last = np.flatnonzero(needed == needed.max())
-        levels = shares(self.counts)[-1, last]
-        is_never = np.isinf(needed.max())
-        place = levels.argmin() if is_never else 0
-        part, name = names[last[place]]
-        text = f"{part}: {name}" if len(self.parts) > 1 else name
+        last = np.flatnonzero(needed == needed.max()).tolist()
+        worst, reached = last[0], ""
         # Needless stops are no share of anything.
-        if is_never and name != NEEDLESS:
-            text = f"{text}, {levels[place]:.0%} at {BUDGETS[-1]:.0%}"
-        return f"{text} (+{len(last) - 1})" if len(last) > 1 else text
+        shared = [place for place in last if names[place][1] != NEEDLESS]
+        if np.isinf(needed.max()) and shared:
+            levels = shares(self.counts)[-1]
+            worst = min(shared, key=lambda place: levels[place])
+            reached = f", {levels[worst]:.1%} at {BUDGETS[-1]:.0%}"
+        part, name = names[worst]
+        text = f"{part}: {name}" if len(self.parts) > 1 else name
+        return f"{text}{reached} (+{len(last) - 1})" if len(last) > 1 else text + reached
 
     def cut_to(self, worlds: Iterable[tuple[str, int | str]]) -> "BudgetResult | None":
         """Return the result in these worlds, in their order; None where one is missing."""
