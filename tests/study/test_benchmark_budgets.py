@@ -111,7 +111,7 @@ def test_what_holds_an_entry_back_names_the_part_where_there_are_several():
     late = made_budgets("care", *curves, recorded=drives, later=NEVER)
     assert late.held_back_by == "recorded: emerging, 50.0% at 20% (+3)"
     assert made_budgets("care", *[ALWAYS] * 4).held_back_by == ""
-    # Of those that never get there, the one that is farthest away.
+    # If several never get there, the farthest one is named.
     low, lower = ([0.0] * 6 + [share] for share in (0.8, 0.6))
     assert made_budgets("care", low, ALWAYS, lower, low).held_back_by == "kept, 60.0% at 20% (+2)"
 

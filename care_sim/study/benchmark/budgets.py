@@ -162,8 +162,8 @@ class BudgetResult:
     @property
     def held_back_by(self) -> str:
         """The count that reaches 90% last, with its part where there are several, and how many more
-        reach it no earlier. Of counts that never reach it, the one with the least share at the
-        largest budget, and this share. Empty if the smallest budget is enough.
+        reach it no earlier. If counts never reach it, the one with the least share at the largest
+        budget stands for them, with this share. Empty if the smallest budget is enough.
         """
         names = [(part, name) for part in self.parts for name in COUNTS[part]]
         needed = reaching(self.counts)
