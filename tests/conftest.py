@@ -4,6 +4,7 @@ test.
 
 import os
 import shutil
+import signal
 import sys
 from collections import defaultdict
 from pathlib import Path
@@ -26,6 +27,14 @@ from tests.helpers.short_streets import few_and_short
 SLOW = {*(Path(__file__).with_name("slow.txt").read_text().split())}
 """Tests that took a second and a half of two cores, which `make test-long` runs: from
 `--durations=0`."""
+
+
+@pytest.fixture
+def interruptible():
+    """Also where the tests run in the background, with interrupts ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def pytest_collection_modifyitems(items):

@@ -4,7 +4,6 @@ import os
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
-from weakref import finalize
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +24,7 @@ class Threads:
         """Run `kernel(live, *given)`, which works on the rows of the worlds that are `live` (W,)
         alone. Every thread takes some of these worlds.
         """
+        self.settle()
         count = min(self._count, int(np.count_nonzero(live)))
         if count < 2:
             kernel(live, *given)
@@ -32,15 +32,24 @@ class Threads:
         worlds = np.flatnonzero(live)
         parts = np.zeros((count, len(live)), np.bool_)
         parts[np.arange(len(worlds)) * count // len(worlds), worlds] = True
-        submit = self._executor().submit
-        self._others = others = [submit(kernel, part, *given) for part in parts[1:]]
+        pool = self._executor()
+        others = self._others = list[Future[None]]()
         # All are waited for, whatever one of them raises: no task outlives the call.
         try:
+            others.extend(pool.submit(kernel, part, *given) for part in parts[1:])
             kernel(parts[0], *given)
         finally:
-            errors = [other.exception() for other in others]
-        for error in filter(None, errors):
-            raise error
+            self.settle()
+        # An error must not hold the list that holds it.
+        while others:
+            others.pop().result()
+
+    def settle(self) -> None:
+        """Wait for what an interrupt while waiting has left at work."""
+        # A fork copies no threads, and so no work.
+        if self._process == os.getpid():
+            for other in self._others:
+                other.exception()
 
     def close(self) -> None:
         """End the threads; they begin again if they are needed."""
@@ -52,16 +61,10 @@ class Threads:
         return vars(Threads(self._count))
 
     def _executor(self) -> ThreadPoolExecutor:
-        """Return the other threads, which work on nothing."""
-        # A fork copies no threads: in a new process they begin anew.
+        """Return the other threads. In a new process they begin anew."""
         if self._pool is None or self._process != os.getpid():
             self._pool = ThreadPoolExecutor(self._count - 1, "care-sim worlds")
             self._process = os.getpid()
-            self._others = []
-            finalize(self, self._pool.shutdown, wait=False)
-        # An interrupt while waiting has left some tasks at work.
-        for other in self._others:
-            other.exception()
         return self._pool
 
 

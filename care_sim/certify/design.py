@@ -188,8 +188,9 @@ CERTIFIED_WITHOUT: dict[str, tuple[str, ...]] = {
     REPLAY: _CLOSED_ALONE,
     DRIVE: ("engine",),
 }
-"""Choices that an environment does not have. Bullet needs minutes for some drives, since false
-boxes come from another whole drive.
+"""Choices that the list leaves out of an environment. Recordings lack these, and streets most of
+them; a street would have to be filmed for every weather. Bullet needs minutes for some drives,
+since false boxes come from another whole drive.
 """
 
 _CLOSED_KEYFRAMES = (*(4,) * 7, *(6,) * 4, *(8,) * 5, 12, 12, 16, 60)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import gymnasium
 from gymnasium.vector import AutoresetMode
 
-from care_sim.base.limits import CORES
 from care_sim.base.processes import following, starting
 from care_sim.envs import CLOSED_LOOP, OPEN_LOOP, installed_ids, make_env
 from care_sim.envs.wrappers.grid_observation import GridObservation, VectorGridObservation
@@ -26,8 +25,6 @@ if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv
 
 STREETS_ID = "CARE-Street-v0"
-WORLDS_A_THREAD = 32
-"""Fewest worlds per thread: with fewer, the overhead of a thread exceeds its gain."""
 ACTIONS = {wrapper.__name__: wrapper for wrapper in (SectorReserve, SectorScores)}
 VECTOR_ACTIONS = {
     wrapper.single.__name__: wrapper for wrapper in (VectorSectorReserve, VectorSectorScores)
@@ -142,17 +139,11 @@ def worlds(config: AgentConfig, budgets: list[float]) -> VectorGridObservation:
         "vector_entry_point",
         autoreset_mode=AutoresetMode.DISABLED,
         copy=False,
-        threads=_threads(len(budgets)),
         **_arguments(config, name, budgets),
     )
     seeded = VectorTrainingSeeds(vector, config.seed)
     acting = VECTOR_ACTIONS[config.action](seeded, config.azimuths, config.elevations)
     return VectorGridObservation(acting, config.columns, config.rows)
-
-
-def _threads(count: int) -> int:
-    """Return a useful number of threads for this many worlds, at most one per core."""
-    return min(CORES, max(1, count // WORLDS_A_THREAD))
 
 
 def _arguments(config: AgentConfig, name: str, budget: float | list[float]) -> dict[str, Any]:

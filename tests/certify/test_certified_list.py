@@ -55,7 +55,7 @@ ALTERNATIVES = (
 )
 """An episode has one part of each group at most."""
 LEFT_OUT = {
-    "detector_parameters": "the defaults alone",
+    "detector_parameters": "the benchmark plays measured detectors by their defaults",
     "presence": "decides which objects are counted, nothing that is played",
     "secret": "is hashed into every stream: a street would have to be made for it",
     "sensor": "the default alone: another set-up needs weights and maps of its own",

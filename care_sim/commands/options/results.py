@@ -265,7 +265,8 @@ class Certify(WorkerOptions):
     Play a published list of episodes and say whether they go as published, or where one does
     not.
 
-    The list holds every environment, built-in policy and fault.
+    The list holds every environment, built-in policy, fault, measured detector and driver. It takes
+    some minutes.
     """
 
     all: Flag = False

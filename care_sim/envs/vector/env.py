@@ -33,6 +33,8 @@ from care_sim.envs.worlds import Stepped, Worlds
 from care_sim.loops.stages.choice import Choice
 from care_sim.scenarios.base import Scenario
 
+WORLDS_A_THREAD = 32
+"""Fewest worlds per thread: with fewer, the overhead of a thread exceeds its gain."""
 MOST_WORLDS = 2**16
 MOST_THREADS = 1024
 MOST_STEPS = 2**31 - 1
@@ -49,7 +51,8 @@ def check_steps(single: type[ClosedLoopEnv]) -> None:
 
 
 class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
-    """Worlds of one environment, played together: `num_envs` of them on up to `threads` threads.
+    """Worlds of one environment, played together: `num_envs` of them. Up to `threads` threads share
+    the compiled work, by default one per `WORLDS_A_THREAD` worlds and at most one per core.
 
     World i, begun with a seed, is the single environment begun with it, to the last bit, whatever
     the other worlds do and however many threads there are. All keyword arguments of the single
@@ -76,7 +79,8 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         **arguments: Any,
     ):
         check_whole("num_envs", num_envs, 1, MOST_WORLDS)
-        threads = min(CORES, MOST_THREADS) if threads is None else threads
+        if threads is None:
+            threads = min(CORES, MOST_THREADS, max(1, num_envs // WORLDS_A_THREAD))
         check_whole("threads", threads, 1, MOST_THREADS)
         check_flag("copy", copy)
         if arguments.get("render_mode") is not None:
@@ -232,6 +236,8 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         if not who.any():
             return infos
         self._begun[who] = False
+        # A task that is left would use up the random streams of the new episodes.
+        self._threads.settle()
         own = {world: entropy_of(self._seeded[world], seeds[world]) for world in _places(who)}
         for world, info in self._worlds.begin(own).items():
             infos = self._add_info(infos, info, world)

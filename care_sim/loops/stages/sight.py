@@ -82,7 +82,8 @@ def has_own_detector(conditions: Sensing) -> bool:
 
 
 class Seeing:
-    """The cameras of all worlds, which differ in their `conditions` alone. Shared by `threads`.
+    """The cameras of all worlds, which differ in their `conditions` alone. Pictures are made on
+    `threads`.
 
     Returned arrays are reused at the next keyframe.
     """

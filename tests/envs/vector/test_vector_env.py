@@ -3,6 +3,7 @@
 import copy
 import gc
 import multiprocessing
+import signal
 import threading
 import time
 
@@ -172,8 +173,8 @@ def wait_for(holds, seconds=5.0):
 
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
-def test_a_thread_of_which_no_world_plays(mode):
-    # World 1 is over while world 0, whose episode began later, goes on in the other thread.
+def test_one_world_plays_while_the_other_rests(mode):
+    # World 1 is over while world 0, whose episode began later, goes on.
     arguments = {"budget": 0.03, "duration_s": 0.3}
     env = native(NAME, 2, threads=2, autoreset_mode=mode, **arguments)
     reference = singles(NAME, 2, mode, **arguments)
@@ -206,6 +207,24 @@ def test_after_an_error_all_worlds_begin_anew(vector, monkeypatch):
         vector.step(zeros(vector))
     vector.reset(seed=0)
     assert vector.step(zeros(vector))[0]["tracks"].tobytes() == expected
+
+
+@pytest.mark.usefixtures("interruptible")
+def test_worlds_begin_after_what_an_interrupt_left_at_work(vector, monkeypatch):
+    done, seen, begin = [], [], vector._worlds.begin
+
+    def works(_part):
+        if threading.current_thread() is not threading.main_thread():
+            time.sleep(0.1)
+            signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+            time.sleep(0.3)
+            done.append(True)
+
+    with pytest.raises(KeyboardInterrupt):
+        vector._threads.share(works, np.ones(3, np.bool_))
+    monkeypatch.setattr(vector._worlds, "begin", lambda own: seen.append(bool(done)) or begin(own))
+    vector.reset(seed=0)
+    assert seen == [True]
 
 
 def test_what_is_closed_says_so(vector):

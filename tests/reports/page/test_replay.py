@@ -210,14 +210,6 @@ def test_an_episode_that_ends_otherwise_is_told_from_one_that_does_not(replay):
     assert not Episode({}, "gone").identical
 
 
-@pytest.fixture
-def interruptible():
-    """Also where the tests run in the background, with interrupts ignored."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
 @pytest.mark.usefixtures("interruptible")
 def test_an_interrupt_does_not_wait_for_episodes_that_have_not_begun():
     rows, handed = [CONFIG.row() | {"scenario.duration_s": 0.2}] * 20, []
