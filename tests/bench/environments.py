@@ -38,12 +38,14 @@ TESTS = ENVIRONMENT_IDS["ncap"]
 @dataclass(frozen=True)
 class Settings:
     """`seconds` of every single measurement of steps; `repeats`, rounds in each of which everything
-    is measured once; `samples`, scans per engine and choices per round.
+    is measured once; `samples`, scans per engine and choices per round; `drives`, worlds of each
+    row of the benchmark, which take minutes.
     """
 
     seconds: float = 3.0
     repeats: int = 3
     samples: int = 200
+    drives: int = 64
 
 
 def middle(values):
