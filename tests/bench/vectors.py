@@ -10,8 +10,12 @@ import numpy as np
 
 from care_sim.base.errors import MissingExtra
 from care_sim.base.extras import import_torch
+from care_sim.certify.design import DRAWN_TEST
+from care_sim.core.conditions import KITTI_CAMERA
 from care_sim.envs import ENVIRONMENT_IDS
 from care_sim.policies import make_policy
+from care_sim.study.benchmark.budgets import MAIN_DETECTOR
+from care_sim.study.benchmark.suite import LATE
 from care_sim.study.executors import processes
 from care_sim.training.config import PpoConfig
 from care_sim.training.environments import side_by_side
@@ -22,16 +26,11 @@ WORLDS = 64
 THREADS = {1: "one thread", 2: "two threads"}
 PROCESSES = f"{WORLDS} worlds, two processes"
 """Half of the worlds in each, with a vector and a policy of its own, on one thread."""
-MEASURED = {
-    "budget": 0.01,
-    "detector": "centerpoint",
-    "camera_profile": "kitti",
-    "camera_latency_s": 0.12,
-}
+MEASURED = {"budget": 0.01, "detector": MAIN_DETECTOR, "camera_profile": KITTI_CAMERA} | LATE
 """The conditions of the benchmark in the closed loop."""
 BENCHMARK = {
     "drives": {"environment": ENVIRONMENT_IDS["drive"]},
-    "tests": {"environment": TESTS, "test": "drawn", "speed_kph": 0},
+    "tests": {"environment": TESTS} | DRAWN_TEST,
 }
 """Worlds with the measured camera and detector."""
 RECIPE = PpoConfig(budget=(0.03, 0.05, 0.1, 0.2, 0.35))

@@ -154,11 +154,11 @@ def test_the_table_of_b90_is_that_of_the_published_entries():
     (worth,) = (row[4:] for row in newest.rows if row[0] == "without residual")
     assert f"| `care-aimed` (on 24 streets) | {' | '.join(map(str, worth))} |" in page
     small = script.small_budgets().rows
-    _, _, found, without, more, *_, kept, kept_without, _ = small[5][:11]
+    _, _, found, by_all, more, *_, kept, kept_without, _ = small[5][:11]
     assert small[5][:2] == ("care core-spread", "1%")
     assert (
         f"`care core-spread` detects {found}% of the emerging newcomers, and `all-camera "
-        f"core-spread` {without}% ({more.replace(' ', ' points ', 1)}). It keeps {kept}% of the "
+        f"core-spread` {by_all}% ({more.replace(' ', ' points ', 1)}). It keeps {kept}% of the "
         f"objects, not {kept_without}%."
     ) in page
     gains = [float(more.split()[0]) for row in small[5:] for more in (row[4], *row[11:])]
@@ -169,6 +169,14 @@ def test_the_table_of_b90_is_that_of_the_published_entries():
     boxes = results[Entry("boxes")].counts[0]
     emerging, _, kept, _ = boxes.got[:, 1].sum(axis=0) / boxes.full.sum(axis=0)
     assert f"`boxes` detects {emerging:.0%} and keeps {kept:.0%}." in page
+    findings = " ".join((FOLDER / "findings.md").read_text().split())
+    assert f"`care` detects {found}% of the nearby newcomers" in findings
+    assert f"`all-camera`, which uses all camera boxes, detects {by_all}%" in findings
+    tight = {one.entry.name: format_budget(one.score.budget) for one in read_list(script.TIGHT)}
+    told = re.findall(r"`([\w-]+)` \(([\d.]+)%\)", page.partition("count collisions.**")[2])
+    assert len(told) == 4
+    assert {*told} <= {*tight.items()}
+    assert [tight[name] for name in ("care", "all-camera core-spread")] == ["never", "never"]
     # Ratios to other entries than the tables', and what a full scan has.
     rows, care, core_first, all_camera, whole, without = (
         next(one for one in ordered if one.entry == entry)

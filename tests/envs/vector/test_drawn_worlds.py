@@ -5,7 +5,7 @@ from random import Random
 
 import pytest
 
-from care_sim.certify.design import CERTIFIED_WITHOUT, CLOSED, drawn
+from care_sim.certify.design import CLOSED, drawn
 from care_sim.scenarios.dartout import Dense
 from tests.envs.vector.test_same_episodes import CONDITIONS, OWN
 from tests.helpers.vectors import MODES, played_alike
@@ -23,20 +23,17 @@ def first_difference(number):
     episodes = (drawn(rng.randrange(10_000)) for _ in range(100))
     episode = next(one for one in episodes if one.environment in CLOSED)
     arguments = dict(episode.arguments)
-    if rng.random() < 0.5:
-        conditions = rng.choice([*CONDITIONS.values(), *OWN.values()])
-        # Parameters of the dense street's scenario are none of every other one's.
-        arguments |= {name: v for name, v in conditions.items() if name not in OF_THE_SCENARIO}
-        if "camera_latency_s" in arguments:
-            arguments.pop("camera_latency", None)
-        if arguments.get("driver") == "careful-human":
-            arguments = {name: v for name, v in arguments.items() if not name.startswith("brake_")}
-    # Bullet needs minutes in some drives. A profile takes its false boxes from another whole world,
-    # which takes seconds: one in four keeps it.
-    for name in CERTIFIED_WITHOUT.get(episode.environment, ()):
-        arguments.pop(name, None)
-    if rng.random() < 0.75:
+    conditions = rng.choice([*CONDITIONS.values(), *OWN.values()]) if rng.random() < 0.5 else {}
+    # A profile takes its false boxes from another whole world, which takes seconds, and with Bullet
+    # minutes: one episode in four keeps its own.
+    if "engine" in conditions or rng.random() < 0.75:
         arguments.pop("camera_profile", None)
+    # Parameters of the dense street's scenario are none of every other one's.
+    arguments |= {name: v for name, v in conditions.items() if name not in OF_THE_SCENARIO}
+    if "camera_latency_s" in arguments:
+        arguments.pop("camera_latency", None)
+    if arguments.get("driver") == "careful-human":
+        arguments = {name: v for name, v in arguments.items() if not name.startswith("brake_")}
     if arguments.get("detector"):
         arguments.pop("min_returns", None)
     return played_alike(
