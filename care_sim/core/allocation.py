@@ -67,6 +67,7 @@ def fill_stages(
 
 @compiled()
 def fill_worlds(
+    live: Mask,
     cells: Cells,
     sizes: Integers,
     counts: Integers,
@@ -76,8 +77,9 @@ def fill_worlds(
     scores: NDArray[np.float32],
 ) -> None:
     """Replace what is scored in `scores` (W, N), the first `chosen_counts` (W,) cells of each row
-    of `chosen` (W, N), by what each world takes. Stage k of world w has `counts[w, k]` sets and
-    fills up to `limits[w, k]` cells in all; worlds follow each other in every stage.
+    of `chosen` (W, N), by what each world takes, in the worlds that are `live` (W,). Stage k of
+    world w has `counts[w, k]` sets and fills up to `limits[w, k]` cells in all; worlds follow each
+    other in every stage.
     """
     sets = _offered(cells, sizes)
     taken = np.zeros(scores.shape[1], np.bool_)
@@ -85,18 +87,19 @@ def fill_worlds(
     firsts = counts.sum(axis=0)
     firsts = np.cumsum(firsts) - firsts
     for world in range(len(scores)):
-        own = chosen[world]
-        for cell in own[: chosen_counts[world]]:
-            scores[world, cell] = 0
-        count = _fill(sets, firsts, counts[world], limits[world], Selection(own, taken, 0))
-        firsts += counts[world]
-        chosen_counts[world] = count
+        if live[world]:
+            own = chosen[world]
+            for cell in own[: chosen_counts[world]]:
+                scores[world, cell] = 0
+            count = _fill(sets, firsts, counts[world], limits[world], Selection(own, taken, 0))
+            chosen_counts[world] = count
 
-        # The arithmetic of `care_sim.core.firing.actions.scores_of`, in float32 as there.
-        whole = np.float32(2 * max(count, 1))
-        for place in range(count):
-            scores[world, own[place]] = (whole - np.float32(place)) / whole
-            taken[own[place]] = False
+            # The arithmetic of `care_sim.core.firing.actions.scores_of`, in float32 as there.
+            whole = np.float32(2 * max(count, 1))
+            for place in range(count):
+                scores[world, own[place]] = (whole - np.float32(place)) / whole
+                taken[own[place]] = False
+        firsts += counts[world]
 
 
 @compiled()

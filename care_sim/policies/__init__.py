@@ -12,6 +12,7 @@ import gymnasium.vector
 
 from care_sim.base.errors import BrokenPolicy, InvalidInput, shown
 from care_sim.base.plugins import Plugins, refuse_link
+from care_sim.base.threads import ALONE
 from care_sim.base.vectors import attribute_of_each, shared_attribute
 from care_sim.policies.base import Policy
 from care_sim.policies.controls.patterns import Fan, Place, Rows, Stride, Sweep, TunedPlace
@@ -189,7 +190,7 @@ def make_policy(name: str, env: _AnyEnv, /, **parameters: object) -> Policy | Ve
         parameters.setdefault(parameter, _setting_of(env, setting))
     makers = [partial(made, name, make, [rig, *truth], parameters) for rig in rigs]
     if isinstance(env, gymnasium.vector.VectorEnv):
-        return policy_of_rigs(makers, rigs)
+        return policy_of_rigs(makers, rigs, getattr(env.unwrapped, "thread_pool", ALONE))
     return makers[0]()
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.threads import ALONE, Threads
 from care_sim.core.arrays import Integers, Mask
 from care_sim.core.belief import Observation
 from care_sim.core.beliefs import Beliefs, check_observed
@@ -72,11 +73,15 @@ class VectorPolicy(ABC):
         return given
 
 
-def vector_policy(make: Callable[[], Policy], worlds: int) -> VectorPolicy:
-    """Return the vector policy of this many worlds, each played as by a single policy of `make`."""
+def vector_policy(
+    make: Callable[[], Policy], worlds: int, threads: Threads = ALONE
+) -> VectorPolicy:
+    """Return the vector policy of this many worlds, each played as by a single policy of `make`. The
+    `threads` share the compiled work.
+    """
     first = make()
     if isinstance(first, RowPolicy) and _asks_as(first, RowPolicy):
-        return _ByRows(first, worlds)
+        return _ByRows(first, worlds, threads)
     if isinstance(first, FixedPolicy) and _asks_as(first, FixedPolicy):
         return _Fixed(first, worlds)
     return _OneEach([first, *(make() for _ in range(worlds - 1))])
@@ -96,10 +101,10 @@ def _asks_as(policy: Policy, kind: Any) -> bool:
 class _ByRows(VectorPolicy):
     """All worlds at once, by the rows of all."""
 
-    def __init__(self, policy: RowPolicy, worlds: int):
+    def __init__(self, policy: RowPolicy, worlds: int, threads: Threads):
         super().__init__(policy.rig, worlds)
         self._policy = policy
-        self._allocator = Allocator(policy.rig, worlds)
+        self._allocator = Allocator(policy.rig, worlds, threads)
 
     def _actions(self, observation: Observation, live: Mask) -> Actions:
         beliefs = Beliefs.from_observation(observation, self.rig, live)
@@ -177,9 +182,11 @@ def _world(observation: Observation, world: int) -> Observation:
     return {name: tables[world] for name, tables in observation.items()}
 
 
-def policy_of_rigs(makers: Sequence[Callable[[], Policy]], rigs: Sequence[Rig]) -> VectorPolicy:
+def policy_of_rigs(
+    makers: Sequence[Callable[[], Policy]], rigs: Sequence[Rig], threads: Threads = ALONE
+) -> VectorPolicy:
     """Return the vector policy of W worlds, each played as by the policy of its `makers` (W,) entry
-    for its `rigs` (W,) entry.
+    for its `rigs` (W,) entry. The `threads` share the compiled work.
     """
     groups: list[list[int]] = []
     for world, rig in enumerate(rigs):
@@ -188,7 +195,7 @@ def policy_of_rigs(makers: Sequence[Callable[[], Policy]], rigs: Sequence[Rig]) 
             groups.append([world])
         else:
             group.append(world)
-    made = [vector_policy(makers[group[0]], len(group)) for group in groups]
+    made = [vector_policy(makers[group[0]], len(group), threads) for group in groups]
     return made[0] if len(made) == 1 else _ByRig(made, list(map(np.array, groups)))
 
 

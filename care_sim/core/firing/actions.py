@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.base.threads import ALONE, Threads
 from care_sim.core.allocation import allocate, fill_worlds, halves_up
 from care_sim.core.arrays import Integers
 from care_sim.core.cells.sets import CellSets, WorldSets
@@ -72,11 +73,14 @@ def shares_of(fired: Cells, action: Action, demand: Demand | None, rig: Rig) -> 
 
 class Allocator:
     """Algorithm 1 for so many `worlds` of a rig, and the scores of what it takes
-    (`care_sim.core.firing.actions.scores_of`), in one table that is used again.
+    (`care_sim.core.firing.actions.scores_of`), in one table that is used again. The `threads` share
+    the worlds.
     """
 
-    def __init__(self, rig: Rig, worlds: int):
+    def __init__(self, rig: Rig, worlds: int, threads: Threads = ALONE):
         self._rig = rig
+        self._threads = threads
+        self._all = np.ones(worlds, np.bool_)
         self._scores = np.zeros((worlds, *rig.grid.shape), np.float32)
         # Memory is taken for what is written alone.
         self._chosen = np.empty((worlds, rig.grid.size), np.int64)
@@ -92,7 +96,8 @@ class Allocator:
         limits = np.repeat(budgets[:, None], len(stages), axis=1)
         limits[:, 0] = halves_up((1 - self._rig.reserve_fraction) * budgets)
         scores = self._scores.reshape(len(self._scores), -1)
-        fill_worlds(sets.cells, sets.sizes, counts, limits, self._chosen, self._counts, scores)
+        given = sets.cells, sets.sizes, counts, limits, self._chosen, self._counts, scores
+        self._threads.share(fill_worlds, self._all, *given)
         shown = self._scores.view()
         shown.flags.writeable = False
         return shown

@@ -67,6 +67,8 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
 
     single: ClassVar[type[ClosedLoopEnv]]
     """The environment of which these are many."""
+    thread_pool: Threads
+    """Threads that share the compiled work."""
 
     def __init__(
         self,
@@ -104,11 +106,11 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         rows: Any = create_empty_array(self.single_observation_space, num_envs)
         self._observed: Observed = rows
         settings = [model.setting for model in self._models]
-        self._threads = Threads(min(num_envs, threads))
-        choice = Choice([one.rig for one in settings], self._model.conditions, self._threads)
+        self.thread_pool = Threads(min(num_envs, threads))
+        choice = Choice([one.rig for one in settings], self._model.conditions, self.thread_pool)
         # Infos without clearances need few of them.
         exact = self._model.scoring_info
-        self._worlds = Worlds(settings, choice, self._observed, exact, self._threads)
+        self._worlds = Worlds(settings, choice, self._observed, exact, self.thread_pool)
         # Each draws the seeds of its later episodes as the single environment does.
         self._seeded = [gymnasium.Env[Any, Any]() for _ in range(num_envs)]
         self._steps = np.zeros(num_envs, np.int64)
@@ -222,7 +224,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
 
     def close_extras(self, **_: Any) -> None:
         """Free the worlds and end the threads."""
-        self._threads.close()
+        self.thread_pool.close()
         self._worlds.close()
 
     def _check_open(self) -> None:
@@ -237,7 +239,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
             return infos
         self._begun[who] = False
         # A task that is left would use up the random streams of the new episodes.
-        self._threads.settle()
+        self.thread_pool.settle()
         own = {world: entropy_of(self._seeded[world], seeds[world]) for world in _places(who)}
         for world, info in self._worlds.begin(own).items():
             infos = self._add_info(infos, info, world)

@@ -221,7 +221,7 @@ def test_worlds_begin_after_what_an_interrupt_left_at_work(vector, monkeypatch):
             done.append(True)
 
     with pytest.raises(KeyboardInterrupt):
-        vector._threads.share(works, np.ones(3, np.bool_))
+        vector.thread_pool.share(works, np.ones(3, np.bool_))
     monkeypatch.setattr(vector._worlds, "begin", lambda own: seen.append(bool(done)) or begin(own))
     vector.reset(seed=0)
     assert seen == [True]
