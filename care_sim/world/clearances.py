@@ -6,12 +6,12 @@ lower bound, and PyBullet computes only the moments that matter.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Integers, Mask, filled
 from care_sim.world.approach import Impact
 from care_sim.world.bodies import BodyKind
 from care_sim.world.body_tables import bodies_near
@@ -22,7 +22,9 @@ from care_sim.world.contact import (
     ClearanceJudge,
     StandIns,
     borrow_judge,
+    boxes_of,
     least_gap,
+    nearest_parts,
 )
 
 
@@ -33,11 +35,12 @@ class Clearances:
         self._kinds: list[tuple[BodyKind, BodyKind] | None] = [None] * worlds
         # The stand-ins of both bodies, and the judge that made them.
         self._pairs: list[tuple[ClearanceJudge, StandIns] | None] = [None] * worlds
-        # By world and step (from 1): the poses of both, a lower bound of their distance, and the
-        # exact distance, NaN where unknown.
+        # Their parts as boxes (W, n, 6), as in `StandIn`, and how many each has.
+        self._boxes = [np.zeros((worlds, 1, 6)) for _ in range(2)]
+        self._counts = np.zeros((worlds, 2), np.int64)
+        # By world and step (from 1): the poses of both, and a lower bound of their distance.
         self._poses = np.zeros((worlds, steps + 1, 2, 7))
         self._bounds = np.full((worlds, steps + 1), np.inf)
-        self._known = np.full((worlds, steps + 1), np.nan)
 
     def begin(self, world: int, kinds: tuple[BodyKind, BodyKind] | None) -> None:
         """Begin an episode with the kinds of the ego and of the first-sighting actor, None without
@@ -46,7 +49,10 @@ class Clearances:
         self._kinds[world] = kinds
         self._pairs[world] = None
         self._bounds[world] = np.inf
-        self._known[world] = np.nan
+        for side, kind in enumerate(kinds or ()):
+            boxes = boxes_of(kind)
+            self._boxes[side] = filled(self._boxes[side], world, boxes)
+            self._counts[world, side] = len(boxes)
 
     def __getstate__(self) -> dict[str, object]:
         return vars(self) | {"_pairs": [None] * len(self._pairs)}
@@ -72,50 +78,55 @@ class Clearances:
         value above `exact_below` may be a lower bound that is also above it.
         """
         recent = steps[:, None] - np.arange(count)
-        bounds = self._bounds[np.arange(len(steps))[:, None], recent]
-        least: Floats = bounds.min(axis=1)
-        asked = np.flatnonzero(live & (least <= exact_below) & (least < np.inf)).tolist()
-        if not asked:
-            return least
-        judge = borrow_judge()
-        for world in asked:
-            moments = zip(bounds[world].tolist(), recent[world].tolist(), strict=True)
-            least[world] = self._least(judge, world, moments, exact_below)
+        least: Floats = self._bounds[np.arange(len(steps))[:, None], recent].min(axis=1)
+        asked = live & (least <= exact_below) & (least < np.inf)
+        if asked.any():
+            judge, first = borrow_judge(), steps - count + 1
+            tables = _nearest(asked, first, count, self._poses, *self._boxes, self._counts)
+            gaps, pairs = (table.tolist() for table in tables)
+            for world in np.flatnonzero(asked).tolist():
+                bodies, poses = self._stand_ins(judge, world), self._poses[world, first[world] :]
+                least[world] = judge.least(bodies, poses, gaps[world], pairs[world])
         return least
 
     def least(self, world: int, begin: int, end: int) -> float:
         """Return the least clearance of a world from its step `begin` to the one before `end`."""
-        moments = zip(self._bounds[world, begin:end].tolist(), range(begin, end), strict=True)
-        return self._least(borrow_judge(), world, moments, math.inf)
+        noted = begin + np.flatnonzero(self._bounds[world, begin:end] < np.inf)
+        if not len(noted):
+            return math.inf
+        judge = borrow_judge()
+        return judge.clearance(self._stand_ins(judge, world), self._poses[world, noted])
 
-    def _least(
-        self,
-        judge: ClearanceJudge,
-        world: int,
-        moments: Iterable[tuple[float, int]],
-        exact_below: float,
-    ) -> float:
-        """Return the least clearance at some `moments`: lower bounds and steps."""
-        # Begin with the smallest bound. Moments with a bound above the smallest distance so far
-        # need no exact distance.
-        least = math.inf
-        for bound, step in sorted(moments):
-            if bound > least or bound == math.inf:
-                break
-            if bound > exact_below:
-                return min(least, bound)
-            least = min(least, self._exact(judge, world, step))
-        return least
-
-    def _exact(self, judge: ClearanceJudge, world: int, step: int) -> float:
-        known = float(self._known[world, step])
+    def _stand_ins(self, judge: ClearanceJudge, world: int) -> StandIns:
         kinds, pair = self._kinds[world], self._pairs[world]
-        if math.isnan(known) and kinds is not None:
-            if pair is None or pair[0] is not judge:
-                pair = self._pairs[world] = judge, judge.stand_ins(*kinds)
-            known = judge.clearance(pair[1], self._poses[world, step])
-            self._known[world, step] = known
-        return known
+        if pair is None or pair[0] is not judge:
+            assert kinds is not None
+            pair = self._pairs[world] = judge, judge.stand_ins(*kinds)
+        return pair[1]
+
+
+@compiled()
+def _nearest(
+    asked: Mask,
+    first: Integers,
+    count: int,
+    poses: Floats,
+    own: Floats,
+    other: Floats,
+    parts: Integers,
+) -> tuple[Floats, Integers]:
+    """Return `nearest_parts` (W, P) of the worlds `asked` (W,) at `count` steps from their `first`
+    (W,) on, and inf beyond. Both bodies have so many `parts` (W, 2) in `own` and `other`.
+    """
+    most = count * (parts[:, 0] * parts[:, 1]).max()
+    gaps = np.full((len(asked), most), np.inf)
+    pairs = np.zeros((len(asked), most), np.int64)
+    for w in range(len(asked)):
+        if asked[w]:
+            boxes, others = own[w, : parts[w, 0]], other[w, : parts[w, 1]]
+            found = nearest_parts(boxes, others, poses[w, first[w] : first[w] + count])
+            gaps[w, : len(found[0])], pairs[w, : len(found[1])] = found
+    return gaps, pairs
 
 
 @compiled(brief=True)

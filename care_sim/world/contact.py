@@ -35,35 +35,28 @@ def least_gap(box: Floats, other: Floats) -> float:
 
 @compiled(brief=True)
 def nearest_parts(own: Floats, other: Floats, poses: Floats) -> tuple[Floats, Integers]:
-    """Return lower bounds of the distances between the parts of two bodies, (n * m,) metres,
-    ascending, and their pairs. Pair i * m + j is part i of n and part j of m. The bound is -inf
-    where parts may overlap.
+    """Return lower bounds of the distances between the parts of two bodies at some moments,
+    (t * n * m,) metres, ascending, and their pairs. Pair (k * n + i) * m + j is part i of n and
+    part j of m at moment k of t. The bound is -inf where parts may overlap.
 
     The boxes of parts are (n, 6) and (m, 6): centre and size in the frame of their body. The bodies
-    stand at `poses` (2, 7) as in `care_sim.world.body_tables.Primitives.poses`.
+    stand at `poses` (t, 2, 7) as in `care_sim.world.body_tables.Primitives.poses`.
     """
-    boxes, others = _standing_parts(own, poses[0]), _standing_parts(other, poses[1])
-    # A body that does not stand upright is in no such box.
-    tilted = poses[0, 3] != 0 or poses[0, 4] != 0 or poses[1, 3] != 0 or poses[1, 4] != 0
-    gaps = np.empty(len(boxes) * len(others))
-    pairs = np.empty(len(gaps), np.int64)
+    gaps = np.empty(len(poses) * len(own) * len(other))
     count = 0
-    for i in range(len(boxes)):
-        for j in range(len(others)):
-            box, there = boxes[i], others[j]
-            aside = max(least_gap(box, there), 0.0)
-            above = max(abs(box[2] - there[2]) - (box[5] + there[5]) / 2, 0.0)
-            apart = math.hypot(aside, above)
-            gap = apart if apart > 0 and not tilted else -math.inf
-
-            # Insertion sort: there are few parts.
-            place = count
-            while place and gaps[place - 1] > gap:
-                gaps[place], pairs[place] = gaps[place - 1], pairs[place - 1]
-                place -= 1
-            gaps[place], pairs[place] = gap, count
-            count += 1
-    return gaps, pairs
+    for pair in poses:
+        boxes, others = _standing_parts(own, pair[0]), _standing_parts(other, pair[1])
+        # A body that does not stand upright is in no such box.
+        tilted = pair[0, 3] != 0 or pair[0, 4] != 0 or pair[1, 3] != 0 or pair[1, 4] != 0
+        for box in boxes:
+            for there in others:
+                aside = max(least_gap(box, there), 0.0)
+                above = max(abs(box[2] - there[2]) - (box[5] + there[5]) / 2, 0.0)
+                apart = math.hypot(aside, above)
+                gaps[count] = apart if apart > 0 and not tilted else -math.inf
+                count += 1
+    order = np.argsort(gaps)
+    return gaps[order], order
 
 
 @compiled()
@@ -103,6 +96,11 @@ StandIns = tuple[StandIn, StandIn]
 """For an ego and another body."""
 
 
+def boxes_of(kind: BodyKind) -> Floats:
+    """Return the parts of a kind as boxes (n, 6); see `StandIn`."""
+    return np.array([(*part.centre, *part.size) for part in kind.parts], float)
+
+
 class ClearanceJudge:
     """Computes the clearance between an ego and another body, given by kinds and poses, with one
     PyBullet client for all worlds. Bit-identical to `BulletWorld.clearance`.
@@ -122,29 +120,36 @@ class ClearanceJudge:
         """Return the stand-ins of an ego of one kind and of another body."""
         return self._stand_in(ego), self._stand_in(other)
 
-    def clearance(
+    def clearance(self, bodies: StandIns, poses: Floats, within: float = 100.0) -> float:
+        """Return the smallest distance between the hulls of two stand-ins at the `poses` (t, 2, 7)
+        of some moments, as in `Primitives.poses`, metres. Negative if they overlap, inf beyond
+        `within`.
+        """
+        gaps, pairs = nearest_parts(bodies[0].boxes, bodies[1].boxes, poses)
+        return self.least(bodies, poses, gaps.tolist(), pairs.tolist(), within)
+
+    def least(
         self,
         bodies: StandIns,
-        poses: Floats | Sequence[Sequence[float]],
+        poses: Floats,
+        gaps: Sequence[float],
+        pairs: Sequence[int],
         within: float = 100.0,
     ) -> float:
-        """Return the smallest distance between the hulls of two stand-ins at `poses` (2, 7), as in
-        `Primitives.poses`, metres. Negative if they overlap, inf beyond `within`.
-        """
-        ego, other = bodies
-        places = np.asarray(poses, float)
-        gaps, pairs = nearest_parts(ego.boxes, other.boxes, places)
-        own, others = places.tolist()
-        # Bodies and links, of which there are none, then place and turn of each shape.
-        fixed = -1, -1, within, -1, -1
-        stances = own[:3], others[:3], own[3:], others[3:], self._client.number
+        """As `clearance`, given the bounds and pairs of `nearest_parts`."""
+        (shapes, _), (others, _) = bodies
         least = math.inf
-        for gap, pair in zip(gaps.tolist(), pairs.tolist(), strict=True):
+        for gap, pair in zip(gaps, pairs, strict=True):
             if gap - PADDING_M > min(least, within):
                 break
-            part, there = divmod(pair, len(other.shapes))
-            shapes = ego.shapes[part], other.shapes[there]
-            for point in pybullet.getClosestPoints(*fixed, *shapes, *stances):
+            moment, parts = divmod(pair, len(shapes) * len(others))
+            part, there = divmod(parts, len(others))
+            own, other = poses[moment].tolist()
+            # Bodies and links, of which there are none, then place and turn of each shape.
+            for point in pybullet.getClosestPoints(
+                *(-1, -1, within, -1, -1, shapes[part], others[there]),
+                *(own[:3], other[:3], own[3:], other[3:], self._client.number),
+            ):
                 least = min(least, point[8])
         return least
 
@@ -152,7 +157,7 @@ class ClearanceJudge:
         """Return True if the hulls of an ego and another body of these kinds touch at `poses` (2,
         7), as in `Primitives.poses`.
         """
-        return self.clearance(self.stand_ins(*kinds), poses, CONTACT_REACH_M) <= 0.0
+        return self.clearance(self.stand_ins(*kinds), poses[None], CONTACT_REACH_M) <= 0.0
 
     @property
     def is_usable(self) -> bool:
@@ -170,8 +175,7 @@ class ClearanceJudge:
     def _stand_in(self, kind: BodyKind) -> StandIn:
         if kind not in self._known:
             shapes = [make_collision_shape([part], self._client.number) for part in kind.parts]
-            boxes = np.array([(*part.centre, *part.size) for part in kind.parts], float)
-            self._known[kind] = StandIn(shapes, boxes)
+            self._known[kind] = StandIn(shapes, boxes_of(kind))
         return self._known[kind]
 
 

@@ -41,7 +41,7 @@ def test_it_tells_what_the_world_of_the_bodies_tells(judge, others, place):
         ego = world.add(CATALOGUE["ego"], place, transparent=True)
         for body, name in bodies:
             pair = judge.stand_ins(CATALOGUE["ego"], CATALOGUE[name])
-            poses = world.primitives.poses[[ego, body]].tolist()
+            poses = world.primitives.poses[None, [ego, body]]
             for within in (100.0, 0.5):
                 clearance = judge.clearance(pair, poses, within)
                 assert clearance == world.clearance(ego, body, within)
@@ -55,29 +55,36 @@ def test_of_bodies_that_lie_on_their_side_all_parts_are_asked_about(judge, x):
         ego = world.add(CATALOGUE["ego"], (0.0, 0.0, 0.1), transparent=True)
         body = world.add(CATALOGUE["pedestrian"], lying)
         pair = judge.stand_ins(CATALOGUE["ego"], CATALOGUE["pedestrian"])
-        poses = world.primitives.poses[[ego, body]]
+        poses = world.primitives.poses[None, [ego, body]]
         assert judge.clearance(pair, poses) == world.clearance(ego, body)
 
 
-def test_pybullet_is_asked_about_the_parts_that_could_be_the_nearest(judge, monkeypatch):
-    asked = []
+@pytest.fixture
+def asked(monkeypatch):
+    """An entry for every pair of parts that PyBullet is asked about."""
+    pairs = []
     exactly = pybullet.getClosestPoints
-    monkeypatch.setattr(pybullet, "getClosestPoints", lambda *its: asked.append(1) or exactly(*its))
+    monkeypatch.setattr(pybullet, "getClosestPoints", lambda *its: pairs.append(1) or exactly(*its))
+    return pairs
+
+
+def test_pybullet_is_asked_about_the_parts_that_could_be_the_nearest(judge, asked):
     pair = judge.stand_ins(CATALOGUE["ego"], CATALOGUE["pedestrian"])
     upright = [0.0, 0.0, 0.0, 1.0]
-    near = [[0.0, 0.0, 0.0, *upright], [12.0, 0.0, 0.0, *upright]]
+    near = np.array([[[0.0, 0.0, 0.0, *upright], [12.0, 0.0, 0.0, *upright]]])
     # The hind leg is nearer than the trunk, and the car's front than its cabin.
     hind_m = 0.285 + 0.16 / 2
     assert judge.clearance(pair, near) == pytest.approx(12.0 - 4.08 / 2 - hind_m, abs=1e-3)
     assert len(asked) == 1
     # Where all lies in each other, nothing tells what is nearest.
-    assert judge.clearance(pair, [near[0], near[0]]) < 0
+    assert judge.clearance(pair, near[:, [0, 0]]) < 0
     assert len(asked) > 2
 
 
 def ahead_by_ten(judge, kind):
     pair = judge.stand_ins(CATALOGUE["ego"], kind)
-    return judge.clearance(pair, [[x, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0] for x in (0.0, 10.0)])
+    poses = [[x, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0] for x in (0.0, 10.0)]
+    return judge.clearance(pair, np.array([poses]))
 
 
 def test_worlds_of_a_thread_share_a_judge_and_threads_do_not():
@@ -101,31 +108,22 @@ POSES = st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0), st.floats(-7.0, 7.
 
 
 class Pair:
-    """The ego and another body, and how often the judge was asked about them."""
+    """The ego and another body."""
 
     def __init__(self, kind):
         self.world = BulletWorld()
         self.footprints = Footprints()
-        self.judge = borrow_judge()
         self.clearances = Clearances(1, 4)
         self.clearances.begin(0, (CATALOGUE["ego"], CATALOGUE[kind]))
-        self.steps, self.asked = np.zeros(1, int), 0
+        self.steps = np.zeros(1, int)
         start = (0.0, 0.0, 0.0)
         self.bodies = []
         for each in (CATALOGUE["ego"], CATALOGUE[kind]):
             self.bodies.append(self.world.add(each, start))
             self.footprints.add(self.bodies[-1], each.size, start)
-        exact = self.judge.clearance
-
-        def clearance(*pair):
-            self.asked += 1
-            return exact(*pair)
-
-        self.judge.clearance = clearance
 
     def close(self):
         self.world.close()
-        del self.judge.clearance
 
     def note(self):
         self.steps += 1
@@ -135,7 +133,11 @@ class Pair:
         self.clearances.note(np.ones(1, bool), self.steps, *tables, whose, np.full(1, np.inf))
 
     def least(self):
-        return self.clearances.least(0, 1, int(self.steps[0]) + 1)
+        count = int(self.steps[0])
+        of_all = self.clearances.least(0, 1, count + 1)
+        told = self.clearances.least_since(self.steps, count, np.ones(1, bool), np.inf)
+        assert told.tolist() == [of_all]
+        return of_all
 
     def put(self, *poses):
         table = np.array(poses)
@@ -161,10 +163,11 @@ def test_the_least_of_all_moments_is_that_of_asking_at_each(kind, moments):
         assert pair.least() == min(each)
 
 
-def test_of_two_that_come_nearer_only_the_last_moment_is_asked_about():
+def test_of_two_that_come_nearer_only_the_last_moment_is_asked_about(asked):
     with closing(Pair("pedestrian")) as pair:
         for x in (9.0, 8.6, 8.2):
             pair.put((0.0, 0.0, 0.0), (x, 1.0, np.pi / 2))
             pair.note()
         assert pair.least() == pytest.approx(8.2 - 2.04 - 0.33, abs=0.01)
-        assert pair.asked == 1
+        # One pair of parts, by `least` and by `least_since`.
+        assert len(asked) == 2
