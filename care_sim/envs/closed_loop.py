@@ -224,7 +224,7 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
         assert worlds is not None
         # An error leaves the world between two keyframes.
         self._over = True
-        stepped = worlds.step(scores, _HERE)
+        stepped = worlds.step(worlds.fired(scores, _HERE), _HERE)
         self.keyframes.append(loop.record(worlds.records))
         info = _first(stepped.columns) | stepped.single.get(0, {})
         terminated, truncated = bool(stepped.terminated[0]), bool(stepped.truncated[0])

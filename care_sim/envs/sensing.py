@@ -25,7 +25,7 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action
 from care_sim.loops.observation_limits import Limits
-from care_sim.loops.stages.choice import Choice
+from care_sim.loops.stages.choice import Choice, check_finite
 from care_sim.loops.truth import Truth, Watchable
 from care_sim.perception.detectors import CLUSTER, PROXY, check_detector, make_detector
 from care_sim.perception.points_only import Detector
@@ -52,6 +52,13 @@ def observation_space(rig: Rig) -> spaces.Space[Any]:
 
 
 def checked_scores(action: NDArray[np.floating], shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """As `as_scores`; raises InvalidInput also for scores that are not finite."""
+    scores = as_scores(action, shape)
+    check_finite(scores)
+    return scores
+
+
+def as_scores(action: NDArray[np.floating], shape: tuple[int, ...]) -> NDArray[np.float32]:
     """The action as float32 scores; a boolean mask is one too. Raises InvalidInput otherwise."""
     scores = as_array("action", action)
     if scores.shape != shape:
@@ -59,13 +66,9 @@ def checked_scores(action: NDArray[np.floating], shape: tuple[int, ...]) -> NDAr
     if scores.dtype.kind not in "biuf":
         raise InvalidInput(f"action must hold numbers, got {scores.dtype}")
     if scores.dtype != np.float32:
-        # Overflow of float32 becomes infinite, which the check below refuses.
+        # Overflow of float32 becomes infinite, which `check_finite` refuses.
         with np.errstate(over="ignore"):
             scores = scores.astype(np.float32)
-    if not np.isfinite(scores).all():
-        raise InvalidInput(
-            "action must not hold NaN or infinity (of float32); score a cell 0 to leave it out"
-        )
     return scores
 
 

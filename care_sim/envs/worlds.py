@@ -159,9 +159,14 @@ class Worlds:
         self.loop.begin(episodes)
         return infos
 
-    def step(self, actions: NDArray[np.float32], who: Mask) -> Stepped:
-        """Let those play that are True in `who` (n,), with their rows of `actions` (n, E, A)."""
-        fired = self._choice.fired(actions, who, self.loop.state.keyframes)
+    def fired(self, actions: NDArray[np.float32], who: Mask) -> Fired:
+        """The cells that the worlds `who` (n,) fire by their rows of `actions` (n, E, A), until the
+        next call. Raises InvalidInput for scores that are not finite.
+        """
+        return self._choice.fired(actions, who, self.loop.state.keyframes)
+
+    def step(self, fired: Fired, who: Mask) -> Stepped:
+        """Let the worlds `who` (n,) play with these cells."""
         stepped = self._played(fired, who)
         told = {
             world: {"fired": fired.cells[world, : fired.counts[world]]} | self.loop.told(world)

@@ -24,7 +24,7 @@ from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats
 from care_sim.core.conditions import DriverSettings
 from care_sim.envs.closed_loop import ClosedLoopEnv
-from care_sim.envs.sensing import Observed, checked_scores
+from care_sim.envs.sensing import Observed, as_scores
 from care_sim.envs.worlds import Stepped, Worlds
 from care_sim.loops.one_world import OneWorld
 from care_sim.loops.records import Keyframe
@@ -251,8 +251,8 @@ def play_together(configs: Sequence[EpisodeConfig]) -> list[Row]:
             while live.any():
                 # In copies, since a policy may keep observations, and write into them.
                 shown = {name: tables.copy() for name, tables in observed.items()}
-                actions = checked_scores(policy(shown, live), observed["ranges"].shape)
-                stepped = worlds.step(actions, live)
+                actions = as_scores(policy(shown, live), observed["ranges"].shape)
+                stepped = worlds.step(worlds.fired(actions, live), live)
                 for world in np.flatnonzero(live).tolist():
                     fired = _fired(stepped, world)
                     hashes[world].add(fired, observed["ranges"][world], worlds.loop.boxes(world))

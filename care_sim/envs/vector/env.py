@@ -19,7 +19,7 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import Action
 from care_sim.envs import scenarios
 from care_sim.envs.closed_loop import ClosedLoopEnv
-from care_sim.envs.sensing import Observed, checked_scores, entropy_of
+from care_sim.envs.sensing import Observed, as_scores, entropy_of
 from care_sim.envs.vector.arguments import (
     autoreset_of,
     kept,
@@ -185,7 +185,8 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
     def step(self, actions: Action) -> tuple[Observed, Floats, Mask, Mask, dict[str, Any]]:
         """Fire the cells that each world's row of `actions` (W, E, A) scores highest.
 
-        Raises InvalidInput for actions of the wrong shape or with values that are not finite.
+        Raises InvalidInput for actions of the wrong shape, and for values that are not finite in
+        worlds that play.
         Raises gymnasium.error.ResetNeeded before `reset`, after an error or interrupt in the middle
         of a step, and for a world that is over in the mode "Disabled".
         """
@@ -197,10 +198,11 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
             raise gymnasium.error.ResetNeeded(
                 f"worlds {shown(_places(begins))} are over: call reset() with a reset_mask"
             )
-        scores = checked_scores(as_array("actions", actions), self.action_space.shape or ())
+        scores = as_scores(as_array("actions", actions), self.action_space.shape or ())
+        fired = self._worlds.fired(scores, ~begins)
         # An error leaves worlds at different keyframes: then all have to begin anew.
         self._begun[:] = False
-        stepped = self._worlds.step(scores, ~begins)
+        stepped = self._worlds.step(fired, ~begins)
         self._begun[:] = True
         self._steps += ~begins
         stepped.truncated[:] |= ~begins & (self._steps >= self._most_steps)

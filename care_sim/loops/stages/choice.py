@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
+from care_sim.base.errors import InvalidInput
 from care_sim.base.threads import ALONE, Threads
 from care_sim.core.arrays import Integers, Mask
+from care_sim.core.belief import lie_between
 from care_sim.core.conditions import Conditions
 from care_sim.core.defaults import CELLS
 from care_sim.core.firing.base import fire_free
@@ -21,6 +23,7 @@ from care_sim.core.rig import Rig
 from care_sim.loops.stages.state import Fired
 
 _NOTHING = np.empty(0, np.int64)
+_LARGEST = float(np.finfo(np.float32).max)
 
 
 class Choice:
@@ -50,18 +53,22 @@ class Choice:
         self._last[world] = _NOTHING
 
     def fired(self, scores: NDArray[np.float32], live: Mask, keyframes: Integers) -> Fired:
-        """Return the cells that fire by `scores` (W, E, A), finite numbers, in the worlds that are
-        `live` (W,), at their `keyframes` (W,); none in the others.
+        """Return the cells that fire by `scores` (W, E, A) in the worlds that are `live` (W,), at
+        their `keyframes` (W,); none in the others. Raises InvalidInput for scores of live worlds
+        that are not finite.
 
         The tables of free cells are the same at every call, and hold its cells till the next.
         """
-        if not self._is_free:
-            return Fired.of(self._in_units(scores, live, keyframes))
         flat = scores.reshape(len(scores), -1)
+        if not self._is_free:
+            check_finite(flat[live])
+            return Fired.of(self._in_units(scores, live, keyframes))
         self._fired.counts[~live] = 0
         floors = self._conditions.floor, self._keys
         given = flat, keyframes, self._budgets, *floors, self._cells, self._fired
         self._threads.share(_fire, live, *given)
+        if self._fired.counts.min() < 0:
+            raise _not_finite()
         return self._fired
 
     def would_fire(self, world: int, scores: NDArray[np.float32], keyframe: int) -> Cells:
@@ -83,6 +90,18 @@ class Choice:
         return rows
 
 
+def check_finite(scores: NDArray[np.float32]) -> None:
+    """Raise InvalidInput for scores that are not finite."""
+    if not np.isfinite(scores).all():
+        raise _not_finite()
+
+
+def _not_finite() -> InvalidInput:
+    return InvalidInput(
+        "action must not hold NaN or infinity (of float32); score a cell 0 to leave it out"
+    )
+
+
 @compiled()
 def _fire(
     live: Mask,
@@ -94,10 +113,15 @@ def _fire(
     units: Cells,
     fired: Fired,
 ) -> None:
-    """Fill `fired` of the worlds that are `live`; see `Choice.fired`."""
+    """Fill `fired` of the worlds that are `live`; see `Choice.fired`. The count is -1 where scores
+    are not finite.
+    """
     chosen = np.empty(scores.shape[1], np.bool_)
     for world in range(len(scores)):
         if live[world]:
             floor = Floor(keys[world, 0], keys[world, 1], keyframes[world])
             given = scores[world], budgets[world], has_floor, floor, units
-            fired.counts[world] = fire_free(*given, chosen, fired.cells[world])
+            # Scores are read here anyway: a pass of its own over those of all worlds takes longer.
+            is_finite = lie_between(scores[world : world + 1], -_LARGEST, _LARGEST)
+            count = fire_free(*given, chosen, fired.cells[world]) if is_finite else -1
+            fired.counts[world] = count
