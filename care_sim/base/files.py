@@ -44,6 +44,14 @@ _WAITS_S = (0.05, 0.1, 0.2)
 _MORE_BYTES = 2**16
 
 
+def cache_folder(name: str) -> Path:
+    """Return the folder of a kind of files that can be made again, in the user's cache folder
+    (`XDG_CACHE_HOME`, else `~/.cache`).
+    """
+    caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache").absolute()
+    return caches / "care-sim" / name
+
+
 @contextmanager
 def replacing(path: Path, kind: bytes = b"") -> Iterator[Path]:
     """Yield a file to write to, which replaces `path` in one move at the end. Readers see the old

@@ -15,19 +15,15 @@ from care_sim.core.conditions import COMING, Sensing
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Detections, Scan, Tracks
-from care_sim.driving.localisation import Localisation, Odometry
 from care_sim.loops.episode import SensorSeeds
-from care_sim.loops.false_box_pools import pool_of_film
 from care_sim.loops.film import Film, Shot
 from care_sim.loops.gathering import acted_on, gather_sweeps
+from care_sim.loops.givens import Given, givens_of
 from care_sim.loops.observation_limits import Limits
 from care_sim.loops.truth import Told, TrackObjects, told_by
 from care_sim.perception.points_only import Detector
 from care_sim.perception.tracker import MemoryRules, TrackMemory
 from care_sim.sensors.annotated import NO_RETURNS, Cloud
-from care_sim.sensors.camera import CameraDetector
-from care_sim.sensors.camera_profiles import invents_boxes
-from care_sim.sensors.false_boxes import EMPTY_POOL
 from care_sim.sensors.lidar import RecordedLidar
 
 
@@ -78,24 +74,14 @@ class OpenLoop:
     ):
         self.film = film
         self.rig = rig
-        objects = sorted(
-            {number for shot in film.shots for number in shot.annotations.objects.tolist()}
-        )
-        # The camera errs object by object, so it needs all objects of the film.
-        self._rows = {number: row for row, number in enumerate(objects)}
         self._lidar = RecordedLidar(rig.grid, sensing, seeds.lidar)
-        pool = pool_of_film(film) if invents_boxes(sensing) else EMPTY_POOL
-        self._camera = CameraDetector(
-            objects, sensing, film.keyframe_s, seeds.camera, film.cameras, pool
-        )
-        self._odometry = Odometry(sensing.ego_speed_sigma, seeds.odometry)
-        self._localisation = Localisation(sensing, film.keyframe_s, seeds.odometry)
         self._detector = detector.begin(seeds.detector, rig, is_filmed=True)
         self._limits = Limits(rig)
         followed = MemoryRules(velocity_keyframes=sensing.velocity_keyframes)
         self._memory = TrackMemory(film.keyframe_s, followed)
         self._track_objects = TrackObjects()
         self._sweep_mask = sensing.sweep_mask
+        self._givens = givens_of(film, sensing, seeds)
         self._held: Cells = np.empty(0, np.int64)
         self.index = 0
         self.told = {}
@@ -131,7 +117,7 @@ class OpenLoop:
         reported, objects = self._detector.detect(self.handed, shot.annotations)
         sure = acted_on(reported, self._detector.track_score)
         detections = reported if sure.all() else reported.take(sure)
-        taken_for = self._localisation.taken_for(shot.sensor)
+        taken_for = self._given.taken_for
         tracks = self._memory.update(detections, taken_for)
         self._track_objects.note(tracks, objects[sure])
         velocities = reported.velocities
@@ -171,7 +157,8 @@ class OpenLoop:
 
         Truth: for the scoring alone.
         """
-        return self._arrived.objects[self._limits.kept_detections(self._arrived.detections)]
+        arrived = self._given.arrived
+        return arrived.objects[self._limits.kept_detections(arrived.detections)]
 
     def full_scan(self) -> Scan:
         """Return the scan of all cells now, before noise and dropout. Truth: for the privileged
@@ -181,26 +168,14 @@ class OpenLoop:
             np.arange(self.rig.grid.size), self._lidar.ranges(self._lidar.peek(self.shot.cloud))
         )
 
-    def _look(self, ranges: NDArray[np.float32]) -> None:
-        shot = self.shot
-        self._localisation.advance()
-        taken_for = self._localisation.taken_for(shot.sensor)
-        self._arrived = self._camera.detect(
-            shot.seen, taken_for.yaw, self._boxes(shot), shot.time_s
-        )
-        ego = self._odometry.reading(shot.ego)
-        tracks = self._memory.tracks(taken_for)
-        self.belief = self._limits.belief(ego, self._arrived.detections, tracks, ranges)
+    @property
+    def _given(self) -> Given:
+        return self._givens[self.index]
 
-    def _boxes(self, shot: Shot) -> Floats:
-        """Return sensor-frame boxes (n, 7) of every object of the film, 0 for objects that are not
-        annotated now. Otherwise the distance of an absent object would begin a burst of misses, and
-        its appearance would fall into this burst.
-        """
-        boxes = np.zeros((len(self._rows), 7))
-        rows = [self._rows[number] for number in shot.annotations.objects.tolist()]
-        boxes[rows] = shot.annotations.boxes
-        return boxes
+    def _look(self, ranges: NDArray[np.float32]) -> None:
+        taken_for, ego, arrived = self._given
+        tracks = self._memory.tracks(taken_for)
+        self.belief = self._limits.belief(ego, arrived.detections, tracks, ranges)
 
     def _range_image(self, fired: Cells, cloud: Cloud) -> NDArray[np.float32]:
         ranges = np.zeros(self.rig.grid.size, np.float32)

@@ -17,6 +17,7 @@ from care_sim.perception.detectors import PROXY
 from care_sim.policies import check_policy
 from care_sim.sensors.setups import sensor_setup
 from care_sim.sources.scenes import Scene, Source
+from care_sim.study.kept_films import kept_film
 from care_sim.study.provenance import detector_digest, detector_files, source_digests
 from care_sim.study.rows.parameters import Parameters
 from care_sim.study.run_config import (
@@ -75,7 +76,7 @@ class PlayConfig(Conditions, RunConfig):
 
     def film(self) -> Film:
         """The film of the scene. Raises InvalidInput where it cannot be made."""
-        return self.source.film(self.scene, self.filmed)
+        return kept_film(self.source, self.scene, self.filmed)
 
     def make_env(self, film: Film) -> FilmEnv:
         """The environment of this play, not yet reset, over the film of its scene."""

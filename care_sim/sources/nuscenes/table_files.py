@@ -19,7 +19,7 @@ import numpy as np
 
 from care_sim.base.digests import file_stamp
 from care_sim.base.errors import InvalidInput
-from care_sim.base.files import json_content, listed_values
+from care_sim.base.files import cache_folder, json_content, listed_values
 from care_sim.core.arrays import Floats
 
 JsonRow = dict[str, Any]
@@ -240,8 +240,7 @@ class SampleStore:
     def _kept(self, form: str, database: str, stamp: str) -> Path:
         """The file of the store, made if it is not there."""
         name = f"{database}-{form}-{stamp}.sqlite"
-        caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache").absolute()
-        folder = caches / "care-sim" / "nuscenes"
+        folder = cache_folder("nuscenes")
         # Nothing may be written there, or the disk is full.
         with suppress(OSError, sqlite3.OperationalError):
             if (folder / name).exists():
