@@ -155,11 +155,11 @@ class Delay:
     """
 
     def __init__(
-        self, latencies: Integers, jitters: Integers, keyframe_s: float, after_s: Floats
+        self, latencies: Integers, jitters: Integers, keyframe_s: float, after_s: Floats | float = 0
     ):
         worlds = len(latencies)
         self._latencies, self._jitters = latencies, jitters
-        self._keyframe_s, self._after_s = float(keyframe_s), after_s
+        self._keyframe_s, self._after_s = float(keyframe_s), np.zeros(worlds) + after_s
         self._draws = DrawnAhead(worlds)
         # No picture is later than latency plus jitter.
         ring = worlds, int((latencies + jitters).max()) + 1
