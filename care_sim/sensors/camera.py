@@ -237,39 +237,58 @@ def _sort_out(
 ) -> None:
     """Leave of the detections `seen` in the worlds that are `live` the surest, sorted. Drop those
     of `missed` (W, n) objects, and all where it is `dark` (W,). The last `false` (W,) ones, which
-    no miss concerns, get the age of their pictures. `known` are how many objects a world has (W,)
-    and their numbers (W, n).
+    no miss concerns, get the age of their `pictures` (W, k, 2). `known` are how many objects a
+    world has (W,) and their numbers (W, n).
     """
     for w in range(len(live)):
         if not live[w]:
             continue
-        true, count = seen.counts[w] - false[w], 0
+        true = seen.counts[w] - false[w]
+        for n in range(true, seen.counts[w] if pictures.shape[1] else 0):
+            for k in range(2):
+                seen.rows[w, n, _AGE + k] = pictures[w, int(seen.rows[w, n, _CAMERA]), k]
+        # In the dark nothing is reported, false boxes included; delays go on.
+        count = 0
         for n in range(0 if dark[w] else seen.counts[w]):
-            row, body = seen.rows[w, n], seen.objects[w, n]
-            lost = False
-            for place in range(min(known[0][w], missed.shape[1])):
-                lost |= n < true and missed[w, place] and known[1][w, place] == body
-            if n >= true and pictures.shape[1]:
-                for k in range(2):
-                    row[_AGE + k] = pictures[w, int(row[_CAMERA]), k]
-            if not lost:
-                for k in range(len(row)):
-                    seen.rows[w, count, k] = row[k]
-                seen.objects[w, count] = body
+            if n >= true or not _is_missed(seen.objects[w, n], w, missed, known):
+                _copy_row(seen, w, n, count)
                 count += 1
+        seen.counts[w] = count
+        _sort(seen, w, least[w], false[w] > 0)
 
-        # Edges of `yolox` and of plain false boxes are whole on false boxes alone, which published
-        # episodes hold. The next version of the benchmark rounds all of them here.
-        # The leftmost of equally sure boxes comes first: nothing depends on the order of bodies,
-        # nor may it tell which are false.
-        rows, objects = sort_by_confidence(
-            seen.rows[w, :count], seen.objects[w, :count], least[w], false[w] > 0
-        )
-        seen.counts[w] = len(rows)
-        for n in range(len(rows)):
-            seen.objects[w, n] = objects[n]
-            for k in range(rows.shape[1]):
-                seen.rows[w, n, k] = rows[n, k]
+
+@compiled(brief=True)
+def _sort(seen: Detected, world: int, least: float, by_all: bool) -> None:
+    """Sort the detections of a world; see `sort_by_confidence`."""
+    # Edges of `yolox` and of plain false boxes are whole on false boxes alone, which published
+    # episodes hold. The next version of the benchmark rounds all of them here.
+    # The leftmost of equally sure boxes comes first: nothing depends on the order of bodies, nor
+    # may it reveal which boxes are false.
+    count = seen.counts[world]
+    rows, objects = sort_by_confidence(
+        seen.rows[world, :count], seen.objects[world, :count], least, by_all
+    )
+    seen.counts[world] = len(rows)
+    for n in range(len(rows)):
+        seen.objects[world, n] = objects[n]
+        for k in range(rows.shape[1]):
+            seen.rows[world, n, k] = rows[n, k]
+
+
+@compiled(brief=True)
+def _is_missed(body: int, world: int, missed: Mask, known: tuple[Integers, Integers]) -> bool:
+    """Whether an object of a world is missed; see `_sort_out`."""
+    for place in range(min(known[0][world], missed.shape[1])):
+        if missed[world, place] and known[1][world, place] == body:
+            return True
+    return False
+
+
+@compiled(brief=True)
+def _copy_row(seen: Detected, world: int, n: int, to: int) -> None:
+    seen.objects[world, to] = seen.objects[world, n]
+    for k in range(seen.rows.shape[2]):
+        seen.rows[world, to, k] = seen.rows[world, n, k]
 
 
 _HERE = np.ones(1, np.bool_)

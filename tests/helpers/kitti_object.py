@@ -99,7 +99,9 @@ def labels_of(seen, boxes, places, cameras):
     visible = np.empty((1, 0)) if seen.visible is None else seen.visible[None]
     rows = seen.detections.rows()[None].copy()
     mounted = mounted_cameras(1, cameras)
-    lay_labels(np.ones(1, np.bool_), counts, rows, places[None], visible, boxes[None], mounted, labels)
+    lay_labels(
+        np.ones(1, np.bool_), counts, rows, places[None], visible, boxes[None], mounted, labels
+    )
     return labels_in(labels, 0, len(seen))
 
 

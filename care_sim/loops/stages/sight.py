@@ -76,7 +76,10 @@ class Seeing:
         """(W,) world steps from a keyframe to the pictures that it takes."""
         self._designed = mounted_cameras(worlds, rig.cameras)
         self._errs = np.array(
-            [bool(one.camera_rotation_sigma_deg or one.camera_position_sigma_m) for one in conditions]
+            [
+                bool(one.camera_rotation_sigma_deg or one.camera_position_sigma_m)
+                for one in conditions
+            ]
         )
         self._built: list[World | None] = [None] * worlds
         # Bodies of whom somebody asks at every keyframe, whether a camera shows them.
@@ -170,7 +173,9 @@ class Seeing:
             engine = make_engine(self._engine, built.bullet, self._rig.grid)
             boxes = reported.boxes[world, : reported.counts[world]].copy()
             drawn = photographed(engine, made, state.sensors.frame(world), boxes)
-            shown[world, [row[0] for table in drawn for row in table if row[5] >= MIN_PIXELS]] = True
+            shown[world, [row[0] for table in drawn for row in table if row[5] >= MIN_PIXELS]] = (
+                True
+            )
             seen = seen.put(world, faultless_detections(drawn, class_table(built.labels())))
         return seen
 
@@ -308,7 +313,12 @@ def _photograph(
         return found[:0]
     corners, faces, edges, starts, owners, reaches = outlines.meshes
     meshes = Meshes(
-        corners[world], faces[world], edges[world], starts[world], owners[world, :parts], reaches[world]
+        corners[world],
+        faces[world],
+        edges[world],
+        starts[world],
+        owners[world, :parts],
+        reaches[world],
     )
     # As `PinholeCamera.stance` of an upright sensor.
     cos, sin = sensors.turns[world]

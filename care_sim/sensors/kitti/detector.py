@@ -80,8 +80,9 @@ class KittiDetectors:
         self._numbers, times = measured()
         self._threads = threads
         self._cameras = cameras
-        edges = times.edges_lasting, times.edges_share, times.edges_s
-        self._edges = PersistentNormals(worlds, *([one] * EDGES for one in edges), keyframe_s)
+        lasting, shares = [times.edges_lasting] * EDGES, [times.edges_share] * EDGES
+        edges_s = [times.edges_s] * EDGES
+        self._edges = PersistentNormals(worlds, lasting, shares, edges_s, keyframe_s)
         self._luck = PersistentNormals(
             worlds, [0.0], [times.luck_share], [times.luck_s], keyframe_s
         )
@@ -100,7 +101,7 @@ class KittiDetectors:
         cameras: Sequence[PinholeCamera],
         seeds: Sequence[np.random.SeedSequence],
     ) -> None:
-        """Begin an episode with so many objects that may ever be found. `cameras` are as mounted."""
+        """Begin an episode with so many objects that may be found. `cameras` are as mounted."""
         streams = *seeds[:2], seeds[3], *seeds[2].spawn(2)
         luck, edges, key, beside, scene = (np.random.default_rng(seed) for seed in streams)
         self._luck.begin(world, objects, luck)
@@ -142,12 +143,12 @@ class KittiDetectors:
         true = seen.counts - false
         places = np.zeros((len(live), most), np.int64)
         lay_places(live, true, seen.objects, counts, numbers, places)
-        given = true, seen.rows, places, visible, boxes, cameras, labels
-        self._threads.share(lay_labels, live, *given)
+        there = true, seen.rows, places, visible, boxes, cameras
+        self._threads.share(lay_labels, live, *there, labels)
         room = most * (1 + PAIRS * MOST) + self._cameras * len(self._numbers.pairs) * MOST
         into = Detected.of(len(live), room)
-        given = labels, seen, lasting, counts, self._pictures, cameras.focals, self._numbers
         _copy_detected(~live, seen, into)
+        given = labels, seen, lasting, counts, self._pictures, cameras.focals, self._numbers
         self._threads.share(_report, live, *given, false, into)
         return into
 
@@ -207,26 +208,38 @@ def _report(
         lent = _lent(seen.rows[w, true : seen.counts[w]], focals)
         found, shown_in = report(labels_in(labels, w, true), pictures[w], lent, draws, numbers)
 
-        # Objects first. One pixel of KITTI is the unit of all edges.
+        # Objects first.
         reported = 0
         for is_false in (False, True):
             for n in range(len(shown_in)):
-                source = found.sources[n]
-                if is_false != (source < 0):
-                    continue
-                row = into.rows[w, reported]
-                for k in range(len(row)):
-                    row[k] = 0.0 if is_false else seen.rows[w, source, k]
-                row[_CLASS], row[_CONFIDENCE] = found.classes[n], found.scores[n]
-                row[_CAMERA] = shown_in[n]
-                scale = FOCAL_PX / focals[shown_in[n]]
-                for j in range(EDGES):
-                    row[_LEFT + j] = np.trunc(found.edges[n, j]) / scale
-                into.objects[w, reported] = NO_OBJECT if is_false else seen.objects[w, source]
-                reported += 1
+                if is_false == (found.sources[n] < 0):
+                    _enter(seen, w, found, n, shown_in[n], focals, into, reported)
+                    reported += 1
             if not is_false:
                 false[w] = len(shown_in) - reported
         into.counts[w] = reported
+
+
+@compiled()
+def _enter(
+    seen: Detected,
+    world: int,
+    found: Boxes,
+    n: int,
+    camera: int,
+    focals: Floats,
+    into: Detected,
+    at: int,
+) -> None:
+    """Enter the box n of a world's reports in row `at` of the detections."""
+    source, row = found.sources[n], into.rows[world, at]
+    for k in range(len(row)):
+        row[k] = seen.rows[world, source, k] if source >= 0 else 0.0
+    row[_CLASS], row[_CONFIDENCE], row[_CAMERA] = found.classes[n], found.scores[n], camera
+    # One pixel of KITTI is the unit of all edges.
+    for j in range(EDGES):
+        row[_LEFT + j] = np.trunc(found.edges[n, j]) / (FOCAL_PX / focals[camera])
+    into.objects[world, at] = seen.objects[world, source] if source >= 0 else NO_OBJECT
 
 
 @compiled()
