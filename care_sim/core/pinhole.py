@@ -40,6 +40,17 @@ class CameraModels(NamedTuple):
     centres: Floats
 
 
+class MountedCameras(NamedTuple):
+    """The k cameras of W cars, as they are mounted. `mounts` (W, k, 4, 3) are place and axes in the
+    sensor frame. `focals` (k,), `centres` (k, 2) and `sizes` (k, 2: width, height) are in pixels.
+    """
+
+    mounts: Floats
+    focals: Floats
+    centres: Floats
+    sizes: Integers
+
+
 Numbers4 = tuple[float, float, float, float]
 
 _BOX_POINTS = ((2, 2), (0, 0), (0, 1), (1, 0), (1, 1), (3, 0), (3, 1), (0, 3), (1, 3))
@@ -159,6 +170,13 @@ def model_of(cameras: CameraModels, number: int) -> CameraModel:
         cameras.focals[number],
         cameras.centres[number],
     )
+
+
+@compiled()
+def mounted_model(cameras: MountedCameras, world: int, number: int) -> CameraModel:
+    """A camera of a car."""
+    mount = cameras.mounts[world, number]
+    return CameraModel(mount[0], mount[1:], cameras.focals[number], cameras.centres[number])
 
 
 @compiled()
@@ -384,4 +402,21 @@ def camera_models(cameras: Sequence[PinholeCamera]) -> CameraModels:
         np.array([model.axes for model in models], float).reshape(-1, 3, 3),
         np.array([model.focal for model in models], float),
         np.array([model.centre for model in models], float).reshape(-1, 2),
+    )
+
+
+def mounts_of(cameras: Sequence[PinholeCamera]) -> Floats:
+    """(k, 4, 3) place and axes in the sensor frame of k cameras."""
+    models = camera_models(cameras)
+    return np.concatenate([models.positions[:, None], models.axes], axis=1)
+
+
+def mounted_cameras(worlds: int, cameras: Sequence[PinholeCamera]) -> MountedCameras:
+    """The same cameras on so many cars."""
+    models = camera_models(cameras)
+    return MountedCameras(
+        np.tile(mounts_of(cameras), (worlds, 1, 1, 1)),
+        models.focals,
+        models.centres,
+        np.array([(camera.width, camera.height) for camera in cameras]).reshape(-1, 2),
     )

@@ -79,7 +79,7 @@ class Loop:
         self.observing = Observing(limits, np.array([each.budget for each in rigs]))
         self._in_view = np.zeros(worlds, np.bool_)
         self._reads_worlds = (
-            not self.scanning.is_compiled or self.sight.own.any() or not self._detecting.is_proxy
+            not self.scanning.is_compiled or not self.sight.is_fast or not self._detecting.is_proxy
         )
 
     def begin(self, episodes: Mapping[int, Episode]) -> None:
@@ -170,7 +170,7 @@ class Loop:
 
     def shows(self, world: int, body: int) -> bool:
         """Whether a camera shows enough of a body of a world for a box. Truth."""
-        return bool(self._shown[world, body])
+        return self.sight.shows(self.state, world, body)
 
     def detectable(self, who: Mask) -> Mask:
         """(W,) in which of the worlds `who` `would_detect` holds of the first-sighting actor, if
@@ -197,14 +197,12 @@ class Loop:
 
     def _look_between(self, steps: int) -> None:
         """Take the pictures that are due after so many steps of the worlds."""
-        if not self._reads_worlds:
-            return
-        due = [world for world, after in self.sight.between.items() if after == steps]
-        for world in due:
-            if self.state.live[world]:
+        due = self.state.live & (self.sight.after_steps == steps)
+        if due.any():
+            for world in np.flatnonzero(due & ~self.sight.is_fast).tolist():
                 self.world(world)
-                self.locating.place(self.state, world)
-                self.sight.look_between(self.state, world)
+            self.locating.place(self.state, due)
+            self.sight.look_between(self.state, due)
 
     def _look(self, who: Mask) -> None:
         """Take the cameras' pictures and write the observations of the worlds `who`."""
@@ -214,9 +212,9 @@ class Loop:
             for world in np.flatnonzero(who).tolist():
                 self.world(world)
         self.locating.look(state)
-        self.arrived, self._shown = self.sight.look(state)
+        self.arrived, shown = self.sight.look(state)
         targets = state.egos.targets
-        self._in_view[who] = (self._has_target & self._shown[np.arange(state.worlds), targets])[who]
+        self._in_view[who] = (self._has_target & shown[np.arange(state.worlds), targets])[who]
         self.tracks = self._tracking.seen(state, state.taken)
         self.observing.write(state, self.arrived[:2], self.tracks, self.observed)
 

@@ -186,8 +186,7 @@ class OneWorld:
     @property
     def mounted(self) -> tuple[PinholeCamera, ...]:
         """The cameras at their true mounts."""
-        own = self._loop.sight.own_cameras.get(0)
-        return self.rig.cameras if own is None else own.detector.mounted
+        return self._loop.sight.detectors.mounted[0]
 
     @property
     def _lidar(self) -> Lidar:

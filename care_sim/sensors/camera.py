@@ -7,19 +7,24 @@ from typing import NamedTuple
 
 import numpy as np
 
+from care_sim.base.compiled import compiled
+from care_sim.base.threads import ALONE, Threads
 from care_sim.base.times import LAST_BITS_S
-from care_sim.core.arrays import Floats, Integers
+from care_sim.core.arrays import Floats, Integers, Mask, filled
 from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.conditions import KITTI_CAMERA, YOLOX_CAMERA, CameraFaults, Sensing
-from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.pinhole import PinholeCamera, mounted_cameras, mounts_of
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import NO_OBJECT, IdentifiedDetections
 from care_sim.sensors.camera_errors import ProfiledDetector
 from care_sim.sensors.camera_faults import Delay, Detected, Misses
 from care_sim.sensors.camera_profiles import YOLOX
 from care_sim.sensors.false_boxes import EMPTY_POOL, NO_ROWS, BoxPool, FalseBoxes
-from care_sim.sensors.kitti.detector import KittiDetector
+from care_sim.sensors.kitti.detector import KittiDetectors
 from care_sim.sensors.pictures import sort_by_confidence
+
+# Compiled code can only read module-level constants.
+_AGE, _CAMERA = ImageDetections.AGE, ImageDetections.CAMERA
 
 
 class PictureTiming(NamedTuple):
@@ -45,7 +50,6 @@ def picture_timing(faults: CameraFaults, keyframe_s: float, step_s: float) -> Pi
     return PictureTiming(keyframes, (keyframes * per_keyframe - steps) * step_s)
 
 
-_HERE = np.ones(1, np.bool_)
 NOTHING_SEEN = IdentifiedDetections(
     ImageDetections.from_rows(np.empty((0, len(ImageDetections.COLUMNS)))), np.empty(0, np.int64)
 )
@@ -62,12 +66,236 @@ def mounted(camera: PinholeCamera, faults: CameraFaults, rng: np.random.Generato
     )
 
 
-class CameraDetector:
-    """Turns faultless detections into those that arrive, with the errors and delays of `sensing`.
-    `objects` (n,) are all objects that the detector may ever report. `cameras` are those that the
-    rig knows. False boxes are drawn from `pool`. Pictures can be taken every `step_s` seconds, by
-    default at keyframes only.
+class Annotated(NamedTuple):
+    """What a source annotates of detections in W worlds, without columns where it does not:
+    `visible` (W, D) and `pictures` (W, k, 2) as in `care_sim.sensors.annotated`.
     """
+
+    visible: Floats
+    pictures: Floats
+
+
+class CameraDetectors:
+    """Turn the faultless detections of W worlds into those that arrive, with the errors and delays
+    of `sensing` (W,). `cameras` are those that the rig knows. Pictures can be taken every `step_s`
+    seconds, by default at keyframes only. Returned arrays are reused at the next keyframe.
+    """
+
+    def __init__(
+        self,
+        sensing: Sequence[Sensing],
+        keyframe_s: float,
+        cameras: Sequence[PinholeCamera],
+        step_s: float | None = None,
+        threads: Threads = ALONE,
+    ):
+        worlds = len(sensing)
+        self._sensing = sensing
+        self._keyframe_s = keyframe_s
+        self._designed = tuple(cameras)
+        self._least = np.array([float(each.camera_confidence) for each in sensing])
+        self._misses = Misses(sensing)
+        timings = [picture_timing(each, keyframe_s, step_s or keyframe_s) for each in sensing]
+        self.after_s = np.array([each.after_s for each in timings])
+        """(W,) seconds from a keyframe to the pictures that it takes."""
+        latencies = np.array([each.keyframes for each in timings])
+        jitters = np.array([each.camera_jitter for each in sensing])
+        self._delay = Delay(latencies, jitters, keyframe_s, self.after_s)
+        self._is_late = bool(latencies.any() or jitters.any())
+        self._is_ever_dark = any(each.blackout_s for each in sensing)
+        self.mounted = [self._designed] * worlds
+        """(W,) the cameras as mounted, errors included."""
+        self.cameras = mounted_cameras(worlds, cameras)
+        """The same."""
+        self._objects = np.zeros(worlds, np.int64), np.zeros((worlds, 0), np.int64)
+        self._false_boxes: dict[int, FalseBoxes] = {}
+        self._profiled: dict[int, ProfiledDetector] = {}
+        self._is_kitti = np.array([each.camera_profile == KITTI_CAMERA for each in sensing])
+        self._kitti = (
+            KittiDetectors(worlds, len(cameras), keyframe_s, threads)
+            if self._is_kitti.any()
+            else None
+        )
+        self._taken = Detected.of(worlds, 0)
+        self._unannotated = Annotated(np.empty((worlds, 0)), np.empty((worlds, 0, 2)))
+
+    def begin(
+        self, world: int, objects: Sequence[int], seed: np.random.SeedSequence, pool: BoxPool
+    ) -> None:
+        """Begin an episode with the `objects` (n,) that may ever be reported. False boxes are drawn
+        from `pool`.
+        """
+        # Every fault has a random stream of its own: one switched on leaves the others as they are.
+        *own, errors, jitter, confusion, ghosts = seed.spawn(7)
+        sensing, cameras = self._sensing[world], self._designed
+        counts, numbers = self._objects
+        own_objects = np.asarray(objects, np.int64)
+        counts[world] = len(own_objects)
+        self._objects = counts, filled(numbers, world, own_objects)
+        self._misses.begin(world, seed, len(objects))
+        self._delay.begin(world, own[1])
+        if sensing.false_positive_rate:
+            rng = np.random.default_rng(own[0])
+            made = FalseBoxes(pool, sensing.false_positive_rate, len(cameras), rng)
+            self._false_boxes[world] = made
+        if sensing.camera_rotation_sigma_deg or sensing.camera_position_sigma_m:
+            rng = np.random.default_rng(own[2])
+            cameras = tuple(mounted(camera, sensing, rng) for camera in cameras)
+            self.mounted[world] = cameras
+            self.cameras.mounts[world] = mounts_of(cameras)
+        seeds = errors, jitter, confusion, ghosts
+        if sensing.camera_profile == YOLOX_CAMERA:
+            given = own_objects, cameras, self._keyframe_s, pool, seeds
+            self._profiled[world] = ProfiledDetector(YOLOX, *given)
+        elif self._kitti and self._is_kitti[world]:
+            self._kitti.begin(world, len(objects), cameras, seeds)
+
+    def take(
+        self,
+        live: Mask,
+        seen: Detected,
+        headings: Floats,
+        boxes: Floats,
+        times: Floats,
+        annotated: Annotated | None = None,
+    ) -> None:
+        """Take the pictures of a keyframe in the worlds that are `live`. `seen` are their faultless
+        detections, at `times` (W,) and with the cars' `headings` (W,). `boxes` (W, n, 7) are those
+        of all objects in the sensor frame, in their order, 0 for an absent object.
+        """
+        # All faults draw at every keyframe, whatever is visible, so that every policy meets the
+        # same faults.
+        visible, pictures = annotated or self._unannotated
+        missed = np.zeros((len(live), 0), np.bool_)
+        if self._misses.any:
+            ranges = planar_ranges(boxes.reshape(-1, 7)).reshape(boxes.shape[:2])
+            missed = self._misses.draw(live, ranges)
+        # How many of each world's detections, the last ones, are false.
+        false = np.zeros(len(live), np.int64)
+        for world in np.flatnonzero(live).tolist():
+            if world in self._false_boxes or world in self._profiled:
+                seen = self._invented(world, seen, boxes, float(times[world]), visible, false)
+        whose = live & self._is_kitti
+        if self._kitti and whose.any():
+            objects = *self._objects, boxes
+            seen = self._kitti.detect(whose, seen, false, objects, visible, self.cameras)
+        dark = np.zeros(len(live), np.bool_)
+        if self._is_ever_dark:
+            told = zip(self._sensing, times.tolist(), strict=True)
+            dark = np.array([each.black_at(time_s) for each, time_s in told])
+        _sort_out(live, seen, false, missed, self._objects, dark, pictures, self._least)
+        self._taken = seen
+        if self._is_late:
+            self._delay.take(live, seen, headings)
+
+    def newest(self, live: Mask, headings: Floats) -> Detected:
+        """Begin a keyframe of the worlds that are `live`, with the cars' `headings` (W,). Return
+        the newest detections that are due, the surest first, each with the object behind it.
+        """
+        return self._delay.newest(live, headings) if self._is_late else self._taken
+
+    def _invented(
+        self,
+        world: int,
+        seen: Detected,
+        boxes: Floats,
+        time_s: float,
+        visible: Floats,
+        false: Integers,
+    ) -> Detected:
+        """Return the detections with the reports of a profiled detector and false boxes of a world.
+        Count these in `false` (W,).
+        """
+        own = seen.take(world)
+        rows, objects = own.detections.rows(), own.objects
+        invented = NO_ROWS
+        if world in self._false_boxes:
+            invented = self._false_boxes[world].draw(rows, time_s)
+        if world in self._profiled:
+            share = visible[world] if visible.shape[1] else None
+            there = boxes[world, : self._objects[0][world]]
+            given = replace(own, visible=share), there, invented, time_s
+            rows, objects, invented = self._profiled[world].detect(*given)
+        false[world] = len(invented)
+        rows = np.concatenate([rows, invented])
+        objects = np.append(objects, np.full(len(invented), NO_OBJECT))
+        return seen.put(
+            world, IdentifiedDetections(ImageDetections.from_checked_rows(rows), objects)
+        )
+
+
+@compiled(brief=True)
+def _sort_out(
+    live: Mask,
+    seen: Detected,
+    false: Integers,
+    missed: Mask,
+    known: tuple[Integers, Integers],
+    dark: Mask,
+    pictures: Floats,
+    least: Floats,
+) -> None:
+    """Leave of the detections `seen` in the worlds that are `live` the surest, sorted. Drop those
+    of `missed` (W, n) objects, and all where it is `dark` (W,). The last `false` (W,) ones, which
+    no miss concerns, get the age of their `pictures` (W, k, 2). `known` are how many objects a
+    world has (W,) and their numbers (W, n).
+    """
+    for w in range(len(live)):
+        if not live[w]:
+            continue
+        true = seen.counts[w] - false[w]
+        for n in range(true, seen.counts[w] if pictures.shape[1] else 0):
+            for k in range(2):
+                seen.rows[w, n, _AGE + k] = pictures[w, int(seen.rows[w, n, _CAMERA]), k]
+        # In the dark nothing is reported, false boxes included; delays go on.
+        count = 0
+        for n in range(0 if dark[w] else seen.counts[w]):
+            if n >= true or not _is_missed(seen.objects[w, n], w, missed, known):
+                _copy_row(seen, w, n, count)
+                count += 1
+        seen.counts[w] = count
+        _sort(seen, w, least[w], false[w] > 0)
+
+
+@compiled(brief=True)
+def _sort(seen: Detected, world: int, least: float, by_all: bool) -> None:
+    """Sort the detections of a world; see `sort_by_confidence`."""
+    # Edges of `yolox` and of plain false boxes are whole on false boxes alone, which published
+    # episodes hold. The next version of the benchmark rounds all of them here.
+    # The leftmost of equally sure boxes comes first: nothing depends on the order of bodies, nor
+    # may it reveal which boxes are false.
+    count = seen.counts[world]
+    rows, objects = sort_by_confidence(
+        seen.rows[world, :count], seen.objects[world, :count], least, by_all
+    )
+    seen.counts[world] = len(rows)
+    for n in range(len(rows)):
+        seen.objects[world, n] = objects[n]
+        for k in range(rows.shape[1]):
+            seen.rows[world, n, k] = rows[n, k]
+
+
+@compiled(brief=True)
+def _is_missed(body: int, world: int, missed: Mask, known: tuple[Integers, Integers]) -> bool:
+    """Whether an object of a world is missed; see `_sort_out`."""
+    for place in range(min(known[0][world], missed.shape[1])):
+        if missed[world, place] and known[1][world, place] == body:
+            return True
+    return False
+
+
+@compiled(brief=True)
+def _copy_row(seen: Detected, world: int, n: int, to: int) -> None:
+    seen.objects[world, to] = seen.objects[world, n]
+    for k in range(seen.rows.shape[2]):
+        seen.rows[world, to, k] = seen.rows[world, n, k]
+
+
+_HERE = np.ones(1, np.bool_)
+
+
+class CameraDetector:
+    """The `CameraDetectors` of one world, in an episode with `objects` (n,)."""
 
     def __init__(
         self,
@@ -77,86 +305,19 @@ class CameraDetector:
         seed: np.random.SeedSequence,
         cameras: Sequence[PinholeCamera],
         pool: BoxPool = EMPTY_POOL,
-        step_s: float | None = None,
     ):
-        # Every fault has a random stream of its own: one switched on leaves the others as they are.
-        *own, errors, jitter, confusion, ghosts = seed.spawn(7)
-        false_boxes, _, mount = (np.random.default_rng(child) for child in own)
-        self._objects = np.asarray(objects, np.int64)
-        self._sensing = sensing
-        self._least_confidence = float(sensing.camera_confidence)
-        self._misses = Misses([sensing])
-        self._misses.begin(0, seed, len(objects))
-        rate = sensing.false_positive_rate
-        self._false_boxes = FalseBoxes(pool, rate, len(cameras), false_boxes) if rate else None
-        self.timing = picture_timing(sensing, keyframe_s, step_s or keyframe_s)
-        late = np.array([self.timing.keyframes]), np.array([sensing.camera_jitter])
-        self._delay = Delay(*late, keyframe_s, self.timing.after_s)
-        self._delay.begin(0, own[1])
-        self.mounted = tuple(mounted(camera, sensing, mount) for camera in cameras)
-        """The cameras as mounted, errors included."""
-        self._measured: ProfiledDetector | KittiDetector | None = None
-        seeds = errors, jitter, confusion, ghosts
-        objects_seen = self._objects, self.mounted, keyframe_s
-        if sensing.camera_profile == YOLOX_CAMERA:
-            self._measured = ProfiledDetector(YOLOX, *objects_seen, pool, seeds)
-        elif sensing.camera_profile == KITTI_CAMERA:
-            self._measured = KittiDetector(*objects_seen, seeds)
+        self._all = CameraDetectors([sensing], keyframe_s, cameras)
+        self._all.begin(0, objects, seed, pool)
 
     def detect(
         self, seen: IdentifiedDetections, heading: float, boxes: Floats, time_s: float
     ) -> IdentifiedDetections:
-        """Take a keyframe's pictures and return the newest detections: `take`, then `newest`."""
-        self.take(seen, heading, boxes, time_s)
-        return self.newest(heading)
-
-    def take(
-        self, seen: IdentifiedDetections, heading: float, boxes: Floats, time_s: float
-    ) -> None:
-        """Take the pictures of a keyframe. `seen` are their faultless detections, at `time_s` and
-        with the car's `heading`. `boxes` (n, 7) are those of all objects in the sensor frame, in
-        their order, 0 for an absent object.
+        """Take a keyframe's pictures and return the newest detections: see
+        `CameraDetectors.take` and `CameraDetectors.newest`.
         """
-        # All faults draw at every keyframe, whatever is visible, so that every policy meets the
-        # same faults.
-        rows = seen.detections.rows()
-        objects = seen.objects
-        missed = self._misses.draw(_HERE, planar_ranges(boxes)[None])[0]
-        false = self._false_boxes.draw(rows, time_s) if self._false_boxes else NO_ROWS
-        if self._measured is not None:
-            rows, objects, false = self._measured.detect(seen, boxes, false, time_s)
-        if missed.any():
-            left = ~np.isin(objects, self._objects[missed])
-            rows = rows[left]
-            objects = objects[left]
-        if len(false):
-            if seen.pictures is not None:
-                cameras = false[:, ImageDetections.CAMERA].astype(np.int64)
-                false[:, ImageDetections.TIMING] = seen.pictures[cameras]
-            rows, objects = _with_false_boxes(rows, objects, false)
-        # Edges of `yolox` and of plain false boxes are whole on false boxes alone, which published
-        # episodes hold. The next version of the benchmark rounds all of them in this line:
-        # rows[:, ImageDetections.BOX] = np.trunc(rows[:, ImageDetections.BOX])
-
-        # In the dark nothing is reported, false boxes included; delays go on.
-        if self._sensing.black_at(time_s):
-            rows, objects = rows[:0], objects[:0]
-        # The leftmost of equally sure boxes comes first: nothing depends on the order of bodies.
-        rows, objects = sort_by_confidence(rows, objects, self._least_confidence)
-        seen_here = Detected(np.array([len(rows)]), rows[None], objects[None])
-        self._delay.take(_HERE, seen_here, np.array([heading], float))
-
-    def newest(self, heading: float) -> IdentifiedDetections:
-        """Begin a keyframe with the car's `heading`. Return the newest detections that are due, the
-        surest first, each with the object behind it.
-        """
-        return self._delay.newest(_HERE, np.array([heading], float)).take(0)
-
-
-def _with_false_boxes(rows: Floats, objects: Integers, false: Floats) -> tuple[Floats, Integers]:
-    """Merge true and `false` boxes, ordered by their numbers alone. Boxes of equal confidence and
-    left edge keep this order, so the order must not reveal which are false.
-    """
-    together = np.concatenate([rows, false])
-    order = np.lexsort(together.T)
-    return together[order], np.append(objects, np.full(len(false), NO_OBJECT))[order]
+        here, rows = Detected.of(1, len(seen)).put(0, seen), np.array([heading], float)
+        visible = np.empty(0) if seen.visible is None else seen.visible
+        pictures = np.empty((0, 2)) if seen.pictures is None else seen.pictures
+        annotated = Annotated(visible[None], pictures[None])
+        self._all.take(_HERE, here, rows, boxes[None], np.array([time_s], float), annotated)
+        return self._all.newest(_HERE, rows).take(0)

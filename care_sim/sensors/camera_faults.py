@@ -150,16 +150,16 @@ class _Sent(NamedTuple):
 
 class Delay:
     """Delivers the newest picture that has arrived. One picture per keyframe is taken, `after_s`
-    seconds later. Its delay is the world's `latencies` (W,) keyframes, plus a draw from 0 to its
-    `jitters` (W,).
+    (W,) seconds later. Its delay is the world's `latencies` (W,) keyframes, plus a draw from 0 to
+    its `jitters` (W,).
     """
 
     def __init__(
-        self, latencies: Integers, jitters: Integers, keyframe_s: float, after_s: float = 0.0
+        self, latencies: Integers, jitters: Integers, keyframe_s: float, after_s: Floats | float = 0
     ):
         worlds = len(latencies)
         self._latencies, self._jitters = latencies, jitters
-        self._keyframe_s, self._after_s = float(keyframe_s), float(after_s)
+        self._keyframe_s, self._after_s = float(keyframe_s), np.zeros(worlds) + after_s
         self._draws = DrawnAhead(worlds)
         # No picture is later than latency plus jitter.
         ring = worlds, int((latencies + jitters).max()) + 1
@@ -229,7 +229,7 @@ def _deliver(
     live: Mask,
     headings: Floats,
     keyframe_s: float,
-    after_s: float,
+    after_s: Floats,
     sent: _Sent,
     arrived: Detected,
 ) -> None:
@@ -251,13 +251,9 @@ def _deliver(
                 for n in range(sent.counts[w, place]):
                     arrived.rows[w, n] = sent.rows[w, place, n]
                     arrived.objects[w, n] = sent.objects[w, place, n]
-                    arrived.rows[w, n, _AGE] += age * keyframe_s - after_s
+                    arrived.rows[w, n, _AGE] += age * keyframe_s - after_s[w]
                     arrived.rows[w, n, _YAW_CHANGE] += headings[w] - sent.headings[w, place]
                 break
-
-
-_KEYFRAMES = 64
-"""Keyframes for which numbers are drawn at once."""
 
 
 Draw = Callable[[int], np.ndarray]
@@ -267,13 +263,13 @@ NumPy they are those of k calls for one.
 
 
 class DrawnAhead:
-    """Random numbers drawn ahead: a row per world and keyframe, as long as the longest that a world
-    needs.
+    """Random numbers drawn ahead for so many `keyframes`: a row per world and keyframe, as long as
+    the longest that a world needs.
     """
 
-    def __init__(self, worlds: int):
+    def __init__(self, worlds: int, keyframes: int = 64):
         self._draws: list[Draw | None] = [None] * worlds
-        self._numbers = np.zeros((worlds, _KEYFRAMES, 0))
+        self._numbers = np.zeros((worlds, keyframes, 0))
         self._used = np.zeros(worlds, np.int64)
 
     def begin(self, world: int, draw: Draw) -> None:
@@ -287,7 +283,7 @@ class DrawnAhead:
         if missing > 0:
             room = (0, 0), (0, 0), (0, missing)
             self._numbers = np.pad(self._numbers, room, constant_values=1.0)
-        place = self._used % _KEYFRAMES
+        place = self._used % self._numbers.shape[1]
         for world in np.flatnonzero(live & (place == 0)).tolist():
             self._fill(world)
         self._used += live
@@ -296,6 +292,6 @@ class DrawnAhead:
     def _fill(self, world: int) -> None:
         draw = self._draws[world]
         if draw is not None:
-            rows = draw(_KEYFRAMES)
+            rows = draw(self._numbers.shape[1])
             self._numbers[world] = 1.0
             self._numbers[world, :, : rows.shape[1]] = rows

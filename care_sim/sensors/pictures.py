@@ -101,9 +101,12 @@ def reported_boxes(table: Integers, classes: Integers, camera: int) -> tuple[Flo
 
 
 @compiled()
-def sort_by_confidence(rows: Floats, objects: Integers, least: float) -> tuple[Floats, Integers]:
+def sort_by_confidence(
+    rows: Floats, objects: Integers, least: float, by_all: bool
+) -> tuple[Floats, Integers]:
     """The detections of at least this confidence, the surest first, of equally sure ones the
-    leftmost, and the `objects` (n,) behind them.
+    leftmost, and the `objects` (n,) behind them. Of equals the earlier comes first, or `by_all`
+    their numbers decide, from the last column on.
     """
     order = np.empty(len(rows), np.int64)
     count = 0
@@ -111,7 +114,7 @@ def sort_by_confidence(rows: Floats, objects: Integers, least: float) -> tuple[F
         if not rows[n, _CONFIDENCE] >= least:
             continue
         place = count
-        while place > 0 and _comes_before(rows[n], rows[order[place - 1]]):
+        while place > 0 and _comes_before(rows[n], rows[order[place - 1]], by_all):
             order[place] = order[place - 1]
             place -= 1
         order[place] = n
@@ -126,7 +129,12 @@ def sort_by_confidence(rows: Floats, objects: Integers, least: float) -> tuple[F
 
 
 @compiled()
-def _comes_before(one: Floats, other: Floats) -> bool:
-    if one[_CONFIDENCE] == other[_CONFIDENCE]:
+def _comes_before(one: Floats, other: Floats, by_all: bool) -> bool:
+    if one[_CONFIDENCE] != other[_CONFIDENCE]:
+        return bool(one[_CONFIDENCE] > other[_CONFIDENCE])
+    if one[_LEFT] != other[_LEFT]:
         return bool(one[_LEFT] < other[_LEFT])
-    return bool(one[_CONFIDENCE] > other[_CONFIDENCE])
+    for column in range(len(one) - 1, -1, -1):
+        if by_all and one[column] != other[column]:
+            return bool(one[column] < other[column])
+    return False

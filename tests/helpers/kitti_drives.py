@@ -16,6 +16,7 @@ DRIVES = FOLDER.parent / "kitti-tracking" / "training" / "label_02"
 NAMES = "0001", "0004", "0008", "0015", "0020"
 """The drives from which the pictures of the object benchmark's validation half are."""
 SECONDS = 0.1
+HERE = np.ones(1, np.bool_)
 BEYOND = np.array([0.0, 0.15, 0.3])
 """Shares beyond the picture of the tracking benchmark's levels of truncation (assumed)."""
 
@@ -66,11 +67,13 @@ def played(name, measured, seed):
     labels, rows = as_labels(told)
     places = np.unique(tracks[rows], return_inverse=True)[1]
     rng, times, objects = np.random.default_rng(seed), measured.times, places.max() + 1
-    luck = PersistentNormals(objects, [0.0], [times.luck_share], [times.luck_s], SECONDS, rng)
+    luck = PersistentNormals(1, [0.0], [times.luck_share], [times.luck_s], SECONDS)
     errors = [times.edges_lasting] * 4, [times.edges_share] * 4, [times.edges_s] * 4
-    edges = PersistentNormals(objects, *errors, SECONDS, rng)
-    beside = Renewals((objects, PAIRS * MOST), times.false_s, SECONDS, rng)
-    scene = Renewals((1, 3 * MOST), times.false_s, SECONDS, rng)
+    edges = PersistentNormals(1, *errors, SECONDS)
+    beside = Renewals(1, PAIRS * MOST, times.false_s, SECONDS)
+    scene = Renewals(1, 3 * MOST, times.false_s, SECONDS)
+    for draws, stream in zip((luck, edges, beside, scene), rng.spawn(4), strict=True):
+        draws.begin(0, 1 if draws is scene else objects, stream)
     false_key, key = rng.integers(2**63, size=2).astype(np.uint64)
     nothing = np.empty(0, np.int64), np.empty((0, 4)), np.empty(0, np.int64)
     parts = []
@@ -79,8 +82,10 @@ def played(name, measured, seed):
         shown = type(labels)(*(column[own] for column in labels))
         shown = shown._replace(cameras=np.zeros(own.sum(), np.int64), places=places[own])
         now = np.uint64(key_of(key, frame, 0, 0))
-        false = Chance(false_key, now, beside.next(), scene.next())
-        draws = Draws(luck.next()[:, 0], edges.next(), now, false)
+        began, scenes = beside.next(HERE)[0, :objects], scene.next(HERE)[0, :1]
+        false = Chance(false_key, now, began, scenes)
+        own_luck = np.ascontiguousarray(luck.next(HERE)[0, :objects, 0])
+        draws = Draws(own_luck, edges.next(HERE)[0, :objects], now, false)
         made, _ = report(shown, PICTURE[None], nothing, draws, measured.numbers)
         frames = np.full(len(made.scores), frame)
         parts.append(np.column_stack([made.classes, made.scores, np.trunc(made.edges), frames]))

@@ -1,8 +1,7 @@
 """The cameras of all worlds, and the detections that arrive.
 
-The engine `fast` draws the pictures (`care_sim.sensors.engines.picture_kernels`), and an ideal
-camera detects (`care_sim.sensors.camera`). This camera may miss bodies, be late and black, and
-takes its pictures at keyframes. Other cameras have a detector of their own, world by world.
+The engine `fast` draws the pictures (`care_sim.sensors.engines.picture_kernels`), and their
+detectors report what is in them (`care_sim.sensors.camera`).
 """
 
 from collections.abc import Sequence
@@ -14,15 +13,20 @@ from numpy.typing import NDArray
 from care_sim.base.compiled import compiled
 from care_sim.base.threads import Threads
 from care_sim.core.arrays import Floats, Integers, Mask, longer
-from care_sim.core.cells.boxes import planar_ranges
-from care_sim.core.conditions import IDEAL_CAMERA, CameraFaults, Sensing
+from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Frame, turned_alike
-from care_sim.core.pinhole import NEAR_M, CameraModels, PinholeCamera, model_of, window_on
+from care_sim.core.pinhole import (
+    NEAR_M,
+    MountedCameras,
+    PinholeCamera,
+    mounted_cameras,
+    mounted_model,
+    window_on,
+)
 from care_sim.core.rig import Rig
 from care_sim.loops.stages.state import Bodies, Outlines, Reported, Sensors, State, seen_by
-from care_sim.sensors.annotated import IdentifiedDetections
-from care_sim.sensors.camera import CameraDetector, picture_timing
-from care_sim.sensors.camera_faults import Delay, Detected, Misses
+from care_sim.sensors.camera import CameraDetectors
+from care_sim.sensors.camera_faults import Detected
 from care_sim.sensors.engines import Engine, make_engine
 from care_sim.sensors.engines.picture_kernels import Line, draw_silhouettes, empty_line
 from care_sim.sensors.engines.silhouette_kernels import (
@@ -37,26 +41,11 @@ from care_sim.sensors.pictures import (
     class_table,
     faultless_detections,
     reported_boxes,
-    sort_by_confidence,
 )
-from care_sim.world.bullet import FAR_M
+from care_sim.world.bullet import FAR_M, NO_BODY
 from care_sim.world.world import WORLD_STEP_S, World
 
 _DEPTHS = (NEAR_M, FAR_M)
-
-
-class Cameras(NamedTuple):
-    """The k cameras of a rig and their `models`. `mounts` (k, 4, 3) are place and axes in the
-    sensor frame; `sizes` (k, 2) are width and height in pixels. `least` (W,) is the least
-    confidence of a box per world. `unsorted` (W,) says whether detections stay unsorted, for a
-    detector to come.
-    """
-
-    models: CameraModels
-    mounts: Floats
-    sizes: Integers
-    least: Floats
-    unsorted: Mask
 
 
 class _Room(NamedTuple):
@@ -67,20 +56,6 @@ class _Room(NamedTuple):
     found: Integers
 
 
-def has_own_detector(conditions: Sensing) -> bool:
-    """Whether a camera has faults or a detector of which compiled code knows nothing."""
-    return (
-        conditions.engine != "fast"
-        or conditions.camera_profile != IDEAL_CAMERA
-        or bool(
-            conditions.false_positive_rate
-            or conditions.camera_latency_s
-            or conditions.camera_rotation_sigma_deg
-            or conditions.camera_position_sigma_m
-        )
-    )
-
-
 class Seeing:
     """The cameras of all worlds, which differ in their `conditions` alone. Pictures are made on
     `threads`.
@@ -89,159 +64,120 @@ class Seeing:
     """
 
     def __init__(self, rig: Rig, conditions: Sequence[Sensing], threads: Threads):
-        models = rig.camera_models
+        worlds = len(conditions)
         self._rig = rig
         self._threads = threads
-        self._conditions = conditions
-        self.own = np.array([has_own_detector(each) for each in conditions])
-        """(W,) where detections come from a `CameraDetector` of the world."""
-        self.own_cameras: dict[int, OwnCameras] = {}
-        """Their cameras, by world."""
-        self.between: dict[int, int] = {}
-        """Worlds whose pictures are taken between keyframes, and how many world steps after."""
-        self._cameras = Cameras(
-            models,
-            np.concatenate([models.positions[:, None], models.axes], axis=1),
-            np.array([(camera.width, camera.height) for camera in rig.cameras]).reshape(-1, 2),
-            np.array([float(each.camera_confidence) for each in conditions]),
-            self.own,
+        self._engine = conditions[0].engine
+        self.is_fast = self._engine == "fast"
+        self.detectors = CameraDetectors(
+            conditions, rig.keyframe_s, rig.cameras, WORLD_STEP_S, threads
         )
-        # The faults of own detectors are theirs alone.
-        alike = [
-            CameraFaults() if own else each for own, each in zip(self.own, conditions, strict=True)
-        ]
-        timings = [picture_timing(each, rig.keyframe_s, WORLD_STEP_S) for each in alike]
-        latencies = np.array([timing.keyframes for timing in timings])
-        jitters = np.array([each.camera_jitter for each in alike])
-        self._misses = Misses(alike)
-        self._delay = Delay(latencies, jitters, rig.keyframe_s)
-        self._is_late = bool(latencies.any() or jitters.any())
-        self._faults = alike
-        self._is_fast = conditions[0].engine == "fast"
-        self._is_ever_dark = any(each.blackout_s for each in alike)
-        self._shown = np.zeros((len(conditions), 0), np.bool_)
+        self.after_steps: Integers = np.rint(self.detectors.after_s / WORLD_STEP_S).astype(np.int64)
+        """(W,) world steps from a keyframe to the pictures that it takes."""
+        self._designed = mounted_cameras(worlds, rig.cameras)
+        self._errs = np.array(
+            [
+                bool(one.camera_rotation_sigma_deg or one.camera_position_sigma_m)
+                for one in conditions
+            ]
+        )
+        self._built: list[World | None] = [None] * worlds
+        # Bodies of whom somebody asks at every keyframe, whether a camera shows them.
+        self._asked = np.full((worlds, 1), NO_BODY)
+        self._asks_few = np.zeros(worlds, np.bool_)
+        self._shown = np.zeros((worlds, 0), np.bool_)
+        self._shows_all = np.zeros(worlds, np.bool_)
 
     def begin(self, world: int, built: World, seed: np.random.SeedSequence, pool: BoxPool) -> None:
         """Begin an episode; `seed` is that of the camera (`care_sim.loops.episode.SensorSeeds`).
         False boxes are made from the `pool`.
         """
-        if self.own[world]:
-            given = self._rig, self._conditions[world], seed, pool
-            own = self.own_cameras[world] = OwnCameras(built, *given)
-            if own.after_steps:
-                self.between[world] = own.after_steps
-            return
-        self._misses.begin(world, seed, len(built.labels()))
-        if self._is_late:
-            # The streams are those of `care_sim.sensors.camera.CameraDetector`.
-            _, delay, *_ = seed.spawn(7)
-            self._delay.begin(world, delay)
+        labels = built.labels()
+        self.detectors.begin(world, [*labels], seed, pool)
+        self._built[world] = built
+        target = built.first_sighting
+        asked = [one.body for one in built.meetings] + ([target.body] if target else [])
+        if len(asked) > self._asked.shape[1]:
+            self._asked = longer(self._asked, len(asked), empty=NO_BODY)
+        self._asked[world] = NO_BODY
+        self._asked[world, : len(asked)] = asked
+        # The pictures hold what is reported, and others by chance.
+        self._asks_few[world] = self.after_steps[world] > 0 and labels.keys() >= {*asked}
 
     def look(self, state: State) -> tuple[Detected, Mask]:
         """Take the pictures of a keyframe: the newest detections that are due, and (W, B) which
-        bodies a camera shows enough of for a box.
+        bodies a camera shows enough of for a box, known of those alone that somebody asks about.
         """
-        reported = state.reported
-        _see_boxes(state.live, state.sensors, state.bodies, reported)
-        boxes = reported.boxes
-        seen = Detected.of(state.worlds, len(self._cameras.sizes) * boxes.shape[1])
+        live = state.live
+        _see_boxes(live, state.sensors, state.bodies, state.reported)
         # The other worlds keep what was shown at their last keyframe.
         if self._shown.shape != state.bodies.boxes.shape[:2]:
             self._shown = longer(self._shown, state.bodies.boxes.shape[1])
-        shown = self._shown
-        shown[state.live] = False
-        # Another engine draws its own pictures, world by world.
-        self._threads.share(
-            _look,
-            state.live & self._is_fast,
-            self._cameras,
-            state.sensors,
-            state.bodies,
-            state.outlines,
-            reported,
-            self._silent(state, boxes),
-            seen,
-            shown,
-        )
-        if self._is_late:
-            whose, headings = state.live & ~self.own, state.taken.poses[:, 3]
-            self._delay.take(whose, seen, headings)
-            arrived = self._delay.newest(whose, headings)
-        else:
-            arrived = seen
-        for world in np.flatnonzero(state.live & self.own).tolist():
-            at = state, world, boxes[world, : reported.counts[world]].copy()
-            own = self.own_cameras[world].look(at, seen.take(world), shown[world])
-            arrived = arrived.put(world, own)
-        return arrived, shown
+        self._shown[live] = False
 
-    def look_between(self, state: State, world: int) -> None:
-        """Take the pictures of a world after some of its steps."""
-        bodies = state.reported.bodies[world, : state.reported.counts[world]]
-        boxes = seen_by(state.sensors, world, state.bodies.boxes[world, bodies])
-        self.own_cameras[world].take((state, world, boxes))
+        # Where the detectors' pictures are taken between keyframes, those asked about are looked
+        # for. Elsewhere the pictures show who is there.
+        few = live & self._asks_few & self.is_fast
+        self._shows_all[live] = ~few[live]
+        seen = self._drawn(state, live & ~few, False)
+        if few.any():
+            tables = state.sensors, state.bodies, state.outlines
+            self._threads.share(_look_for, few, self._asked, self._designed, *tables, self._shown)
+        now = live & (self.after_steps == 0)
+        if now.any():
+            self._take(state, now, seen)
+        return self.detectors.newest(live, state.taken.poses[:, 3]), self._shown
 
-    def _silent(self, state: State, boxes: Floats) -> Mask:
-        """(W, R) the reported bodies that are missed, or are there when all is dark."""
-        silent: Mask = np.zeros(boxes.shape[:2], np.bool_)
-        if self._misses.any:
-            ranges = planar_ranges(boxes.reshape(-1, 7)).reshape(silent.shape)
-            silent = self._misses.draw(state.live, ranges)
-        if self._is_ever_dark:
-            times = state.times.tolist()
-            dark = [each.black_at(at) for each, at in zip(self._faults, times, strict=True)]
-            silent |= np.array(dark)[:, None]
-        return silent
+    def look_between(self, state: State, due: Mask) -> None:
+        """Take the pictures of the worlds that are `due`, after some of their steps."""
+        _see_boxes(due, state.sensors, state.bodies, state.reported)
+        self._take(state, due)
 
+    def shows(self, state: State, world: int, body: int) -> bool:
+        """Whether a camera shows enough of a body for a box, at a world's coming keyframe."""
+        if not self._shows_all[world] and body not in self._asked[world]:
+            self._drawn(state, np.arange(state.worlds) == world, False)
+            self._shows_all[world] = True
+        return bool(self._shown[world, body])
 
-class OwnCameras:
-    """The cameras of one world with a `CameraDetector`, whose mounts may err."""
+    def _take(self, state: State, due: Mask, seen: Detected | None = None) -> None:
+        """Hand the detectors their pictures; `seen` is what cameras show where no mount errs."""
+        drawn = due if seen is None else due & self._errs
+        if seen is None or drawn.any():
+            seen = self._drawn(state, drawn, True, seen)
+        headings, boxes = state.taken.poses[:, 3], state.reported.boxes
+        self.detectors.take(due, seen, headings, boxes, state.times)
 
-    def __init__(
-        self,
-        world: World,
-        rig: Rig,
-        sensing: Sensing,
-        seed: np.random.SeedSequence,
-        pool: BoxPool,
-    ):
-        labels = world.labels()
-        self._designed = rig.cameras
-        self._classes = class_table(labels)
-        self._is_fast = sensing.engine == "fast"
-        self._engine = make_engine(sensing.engine, world.bullet, rig.grid)
-        self.detector = CameraDetector(
-            list(labels), sensing, rig.keyframe_s, seed, rig.cameras, pool, step_s=WORLD_STEP_S
-        )
-        self.after_steps = round(self.detector.timing.after_s / WORLD_STEP_S)
-        """World steps from a keyframe to the pictures that the detector is given."""
-
-    def look(
-        self, at: tuple[State, int, Floats], seen: IdentifiedDetections, shown: Mask
-    ) -> IdentifiedDetections:
-        """Take the pictures of a keyframe: the newest detections that are due. `seen` and `shown`
-        (B,) are of the engine `fast`; of another `shown` is written anew.
+    def _drawn(
+        self, state: State, who: Mask, are_mounted: bool, seen: Detected | None = None
+    ) -> Detected:
+        """Draw the pictures of the worlds `who`: write their faultless detections into `seen`, by
+        default a new table. Cameras are as mounted, or as designed; these note who is shown.
         """
-        state, world, boxes = at
-        if not self._is_fast:
-            sensor = state.sensors.frame(world)
-            tables = photographed(self._engine, self._designed, sensor, boxes)
-            shown[:] = False
-            shown[[row[0] for table in tables for row in table if row[5] >= MIN_PIXELS]] = True
-            seen = faultless_detections(tables, self._classes)
-        if not self.after_steps:
-            self.take(at, seen if self.detector.mounted == self._designed else None)
-        return self.detector.newest(float(state.taken.poses[world, 3]))
-
-    def take(self, at: tuple[State, int, Floats], seen: IdentifiedDetections | None = None) -> None:
-        """Hand the detector its pictures; `seen` is what they show, where that is known."""
-        state, world, boxes = at
+        reported = state.reported
         if seen is None:
-            sensor = state.sensors.frame(world)
-            tables = photographed(self._engine, self.detector.mounted, sensor, boxes)
-            seen = faultless_detections(tables, self._classes)
-        heading, time_s = state.taken.poses[world, 3], state.times[world]
-        self.detector.take(seen, float(heading), boxes, float(time_s))
+            seen = Detected.of(state.worlds, len(self._rig.cameras) * reported.boxes.shape[1])
+        if not who.any():
+            return seen
+        cameras = self.detectors.cameras if are_mounted else self._designed
+        shown = np.zeros_like(self._shown) if are_mounted else self._shown
+        if self.is_fast:
+            tables = state.sensors, state.bodies, state.outlines, reported
+            self._threads.share(_look, who, cameras, *tables, seen, shown)
+            return seen
+        # Another engine draws its own pictures, world by world.
+        for world in np.flatnonzero(who).tolist():
+            built = self._built[world]
+            assert built is not None
+            made = self.detectors.mounted[world] if are_mounted else self._rig.cameras
+            engine = make_engine(self._engine, built.bullet, self._rig.grid)
+            boxes = reported.boxes[world, : reported.counts[world]].copy()
+            drawn = photographed(engine, made, state.sensors.frame(world), boxes)
+            shown[world, [row[0] for table in drawn for row in table if row[5] >= MIN_PIXELS]] = (
+                True
+            )
+            seen = seen.put(world, faultless_detections(drawn, class_table(built.labels())))
+        return seen
 
 
 def photographed(
@@ -286,54 +222,60 @@ def _see_boxes(live: Mask, sensors: Sensors, bodies: Bodies, reported: Reported)
 @compiled()
 def _look(
     live: Mask,
-    cameras: Cameras,
+    cameras: MountedCameras,
     sensors: Sensors,
     bodies: Bodies,
     outlines: Outlines,
     reported: Reported,
-    silent: Mask,
     seen: Detected,
     shown: Mask,
 ) -> None:
-    """See `Seeing.look`; of the reported bodies that are `silent` (W, R) there is no detection."""
+    """Draw the pictures around the reported bodies; see `Seeing._drawn`."""
     room = _room(live, cameras, bodies, outlines)
     for w in range(len(live)):
         if not live[w]:
             continue
-        parts = outlines.counts[w]
-        corners, faces, edges, starts, owners, reaches = outlines.meshes
-        meshes = Meshes(corners[w], faces[w], edges[w], starts[w], owners[w, :parts], reaches[w])
-        x, y, z, _, _, _ = sensors.poses[w]
-        cos, sin = sensors.turns[w]
-        classes = _told_classes(reported, w, bodies.counts[w], silent)
+        classes = reported.by_body[w, : bodies.counts[w]]
+        boxes = reported.boxes[w, : reported.counts[w]]
         count = 0
         for camera in range(len(cameras.sizes)):
-            table = _photograph(
-                cameras,
-                camera,
-                ((x, y, z), (cos, sin)),
-                reported.boxes[w, : reported.counts[w]],
-                meshes,
-                bodies.poses[w, : bodies.counts[w]],
-                room,
-            )
+            table = _photograph(cameras, w, camera, sensors, boxes, bodies, outlines, room)
             for n in range(len(table)):
                 shown[w, table[n, 0]] |= table[n, 5] >= MIN_PIXELS
             rows, objects = reported_boxes(table, classes, camera)
             _copy_rows(rows, seen.rows[w, count:])
             _copy(objects, seen.objects[w, count:])
             count += len(rows)
-        if not cameras.unsorted[w]:
-            rows, objects = seen.rows[w, :count], seen.objects[w, :count]
-            surest, objects = sort_by_confidence(rows, objects, cameras.least[w])
-            _copy_rows(surest, seen.rows[w])
-            _copy(objects, seen.objects[w])
-            count = len(surest)
         seen.counts[w] = count
 
 
 @compiled()
-def _room(live: Mask, cameras: Cameras, bodies: Bodies, outlines: Outlines) -> _Room:
+def _look_for(
+    live: Mask,
+    asked: Integers,
+    cameras: MountedCameras,
+    sensors: Sensors,
+    bodies: Bodies,
+    outlines: Outlines,
+    shown: Mask,
+) -> None:
+    """Note which of the bodies `asked` (W, A), padded with NO_BODY, are `shown` (W, B)."""
+    room = _room(live, cameras, bodies, outlines)
+    box = np.empty((1, 7))
+    for w in range(len(live)):
+        for body in asked[w]:
+            if not live[w] or body == NO_BODY:
+                continue
+            _copy(bodies.boxes[w, body], box[0])
+            around = seen_by(sensors, w, box)
+            for camera in range(len(cameras.sizes)):
+                table = _photograph(cameras, w, camera, sensors, around, bodies, outlines, room)
+                for n in range(len(table)):
+                    shown[w, body] |= table[n, 0] == body and table[n, 5] >= MIN_PIXELS
+
+
+@compiled()
+def _room(live: Mask, cameras: MountedCameras, bodies: Bodies, outlines: Outlines) -> _Room:
     """Room for any picture of the worlds that are `live`."""
     parts, width, height = 0, 0, 0
     for w in range(len(live)):
@@ -349,38 +291,41 @@ def _room(live: Mask, cameras: Cameras, bodies: Bodies, outlines: Outlines) -> _
 
 
 @compiled()
-def _told_classes(reported: Reported, world: int, bodies: int, silent: Mask) -> Integers:
-    """The class of every body of a world, -1 of those without one and those that are silent."""
-    classes = reported.by_body[world, :bodies].copy()
-    for n in range(reported.counts[world]):
-        if silent[world, n]:
-            classes[reported.bodies[world, n]] = -1
-    return classes
-
-
-@compiled()
 def _photograph(
-    cameras: Cameras,
+    cameras: MountedCameras,
+    world: int,
     number: int,
-    sensor: tuple[tuple[float, float, float], tuple[float, float]],
+    sensors: Sensors,
     boxes: Floats,
-    meshes: Meshes,
-    poses: Floats,
+    bodies: Bodies,
+    outlines: Outlines,
     room: _Room,
 ) -> Integers:
     """Return the table of the bodies that a camera shows around boxes (n, 7), in the frame of the
-    sensor, which is given by place and turn.
+    world's sensor. A window in which nobody can show MIN_PIXELS stays empty.
     """
-    model = model_of(cameras.models, number)
+    poses, parts = bodies.poses[world, : bodies.counts[world]], outlines.counts[world]
+    found = room.found[: len(poses)]
+    model = mounted_model(cameras, world, number)
     width, height = cameras.sizes[number]
     window = window_on(boxes, model, NEAR_M, width, height)
+    if (window[2] - window[0]) * (window[3] - window[1]) < MIN_PIXELS:
+        return found[:0]
+    corners, faces, edges, starts, owners, reaches = outlines.meshes
+    meshes = Meshes(
+        corners[world],
+        faces[world],
+        edges[world],
+        starts[world],
+        owners[world, :parts],
+        reaches[world],
+    )
     # As `PinholeCamera.stance` of an upright sensor.
-    (x, y, z), turn = sensor
-    mount = turned_alike(cameras.mounts[number], turn)
-    place = np.array((x + mount[0, 0], y + mount[0, 1], z + mount[0, 2]))
+    cos, sin = sensors.turns[world]
+    mount = turned_alike(cameras.mounts[world, number], (cos, sin))
+    place = sensors.poses[world, :3] + mount[0]
     camera = PlacedCamera(place, mount[1:])
     lens = Lens(model.focal, model.centre[0], model.centre[1])
     lay_silhouettes(camera, lens, window, _DEPTHS, meshes, poses, room.seen)
-    found = room.found[: len(poses)]
     no_picture = np.empty((0, 0), np.int64)
     return found[: draw_silhouettes(room.seen, window, _DEPTHS, room.line, found, no_picture)]

@@ -7,12 +7,15 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
+from care_sim.base.threads import Threads
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.pinhole import MountedCameras, PinholeCamera
 from care_sim.core.types import ImageDetections
-from care_sim.sensors.annotated import IdentifiedDetections
+from care_sim.sensors.annotated import NO_OBJECT
+from care_sim.sensors.camera_faults import Detected
 from care_sim.sensors.kitti.background import add_lent, add_scene
 from care_sim.sensors.kitti.beside import PAIRS, add_beside
 from care_sim.sensors.kitti.draws import PersistentNormals, Renewals, key_of
@@ -27,11 +30,20 @@ from care_sim.sensors.kitti.errors import (
     surest_of,
 )
 from care_sim.sensors.kitti.invented import MOST, Boxes, Chance, Picture
-from care_sim.sensors.kitti.labels import Labels, labels_of, pictures_of
+from care_sim.sensors.kitti.labels import (
+    Labels,
+    labels_in,
+    lay_labels,
+    pictures_of,
+    room_for_labels,
+)
 from care_sim.sensors.kitti.numbers import FOCAL_PX, Numbers, measured
 from care_sim.sensors.kitti.recall import features, score_logits, score_of
 
 EDGES = 4
+# Compiled code can only read module-level constants.
+_CLASS, _CONFIDENCE = ImageDetections.CLASS, ImageDetections.CONFIDENCE
+_LEFT, _CAMERA = ImageDetections.LEFT, ImageDetections.CAMERA
 
 
 class Draws(NamedTuple):
@@ -45,79 +57,201 @@ class Draws(NamedTuple):
     false: Chance
 
 
-class KittiDetector:
-    """Makes of faultless detections what the detector reports.
-
-    `objects` (n,) are all that it may ever find, `cameras` those that take the pictures. Every kind
-    of chance has a random stream of its own.
+class Lasting(NamedTuple):
+    """Chance of W worlds at a keyframe: `luck` (W, n) and `edges` (W, n, 4) of n objects, as in
+    `Draws`; `beside` (W, n, ...) and `scene` (W, k, ...), as in `Chance`. `keys` (W, 2) are that of
+    false boxes and that of the episode, `keyframes` (W,) count from 1.
     """
 
-    def __init__(
+    luck: Floats
+    edges: Floats
+    beside: Integers
+    scene: Integers
+    keys: NDArray[np.uint64]
+    keyframes: Integers
+
+
+class KittiDetectors:
+    """Make of faultless detections in W worlds what the detector reports. Every kind of chance has
+    a random stream of its own. Pictures are of so many `cameras`.
+    """
+
+    def __init__(self, worlds: int, cameras: int, keyframe_s: float, threads: Threads):
+        self._numbers, times = measured()
+        self._threads = threads
+        self._cameras = cameras
+        lasting, shares = [times.edges_lasting] * EDGES, [times.edges_share] * EDGES
+        edges_s = [times.edges_s] * EDGES
+        self._edges = PersistentNormals(worlds, lasting, shares, edges_s, keyframe_s)
+        self._luck = PersistentNormals(
+            worlds, [0.0], [times.luck_share], [times.luck_s], keyframe_s
+        )
+        self._beside, self._scene = (
+            Renewals(worlds, states * MOST, times.false_s, keyframe_s)
+            for states in (PAIRS, len(self._numbers.pair_scores))
+        )
+        self._keys = np.zeros((worlds, 2), np.uint64)
+        self._keyframes = np.zeros(worlds, np.int64)
+        self._pictures = np.zeros((worlds, cameras, 5))
+
+    def begin(
         self,
-        objects: Integers,
+        world: int,
+        objects: int,
         cameras: Sequence[PinholeCamera],
-        keyframe_s: float,
         seeds: Sequence[np.random.SeedSequence],
-    ):
+    ) -> None:
+        """Begin an episode with so many objects that may be found. `cameras` are as mounted."""
         streams = *seeds[:2], seeds[3], *seeds[2].spawn(2)
         luck, edges, key, beside, scene = (np.random.default_rng(seed) for seed in streams)
-        self._numbers, times = measured()
-        self._objects = objects
-        self._order = np.argsort(objects)
-        self._cameras = cameras
-        self._pictures = pictures_of(cameras, FOCAL_PX)
-        self._luck = PersistentNormals(
-            len(objects), [0.0], [times.luck_share], [times.luck_s], keyframe_s, luck
-        )
-        self._edges = PersistentNormals(
-            len(objects),
-            [times.edges_lasting] * EDGES,
-            [times.edges_share] * EDGES,
-            [times.edges_s] * EDGES,
-            keyframe_s,
-            edges,
-        )
-        shapes = (len(objects), PAIRS * MOST), (len(cameras), len(self._numbers.pair_scores) * MOST)
-        self._beside, self._scene = (
-            Renewals(shape, times.false_s, keyframe_s, rng)
-            for shape, rng in zip(shapes, (beside, scene), strict=True)
-        )
-        self._false_key, self._key = key.integers(2**63, size=2).astype(np.uint64)
-        self._keyframe = 0
+        self._luck.begin(world, objects, luck)
+        self._edges.begin(world, objects, edges)
+        self._beside.begin(world, objects, beside)
+        self._scene.begin(world, self._cameras, scene)
+        self._keys[world] = key.integers(2**63, size=2).astype(np.uint64)
+        self._keyframes[world] = 0
+        self._pictures[world] = pictures_of(cameras, FOCAL_PX)
 
     def detect(
-        self, seen: IdentifiedDetections, boxes: Floats, lent: Floats, time_s: float
-    ) -> tuple[Floats, Integers, Floats]:
-        """Return the reports on the faultless detections `seen` (m,). Returns rows (k, 9) as
-        `ImageDetections.rows`, (k,) the object behind each, and rows (j, 9) of false boxes. `boxes`
-        (n, 7) are the 3D boxes of all objects in the sensor frame. `lent` (l, 9) are further false
-        boxes, which get scores and errors like the others. Errors change per keyframe, whatever the
-        time.
+        self,
+        live: Mask,
+        seen: Detected,
+        false: Integers,
+        objects: tuple[Integers, Integers, Floats],
+        visible: Floats,
+        cameras: MountedCameras,
+    ) -> Detected:
+        """Return the reports on the detections `seen` in the worlds that are `live`, and `seen` of
+        the others. The last `false` (W,) detections of a world, counted anew, are false: before,
+        those that get scores and errors like the others. `objects` are how many a world has (W,),
+        their numbers (W, n), and 3D boxes (W, n, 7) in the sensor frames. `visible` is as in
+        `lay_labels`, `cameras` are as mounted. Errors change per keyframe, whatever the time.
         """
         # Everything is drawn at every keyframe, whatever is there.
-        self._keyframe += 1
-        luck, edges = self._luck.next()[:, 0], self._edges.next()
-        key = np.uint64(key_of(self._key, self._keyframe, 0, 0))
-        false = Chance(self._false_key, key, self._beside.next(), self._scene.next())
-        draws = Draws(luck, edges, key, false)
+        self._keyframes += live
+        lasting = Lasting(
+            np.ascontiguousarray(self._luck.next(live)[..., 0]),
+            self._edges.next(live),
+            self._beside.next(live),
+            self._scene.next(live),
+            self._keys,
+            self._keyframes,
+        )
+        counts, numbers, boxes = objects
+        most = int(seen.counts.max())
+        labels = room_for_labels(len(live), most)
+        true = seen.counts - false
+        places = np.zeros((len(live), most), np.int64)
+        lay_places(live, true, seen.objects, counts, numbers, places)
+        there = true, seen.rows, places, visible, boxes, cameras
+        self._threads.share(lay_labels, live, *there, labels)
+        room = most * (1 + PAIRS * MOST) + self._cameras * len(self._numbers.pairs) * MOST
+        into = Detected.of(len(live), room)
+        _copy_detected(~live, seen, into)
+        given = labels, seen, lasting, counts, self._pictures, cameras.focals, self._numbers
+        self._threads.share(_report, live, *given, false, into)
+        return into
 
-        places = self._order[np.searchsorted(self._objects, seen.objects, sorter=self._order)]
-        labels = labels_of(seen, boxes[places], places, self._cameras, FOCAL_PX)
-        scales = np.array([FOCAL_PX / camera.focal for camera in self._cameras])
-        cameras = lent[:, ImageDetections.CAMERA].astype(np.int64)
-        edges_lent = lent[:, ImageDetections.BOX] * scales[cameras][:, None]
-        others = lent[:, ImageDetections.CLASS].astype(np.int64), edges_lent, cameras
-        found, shown_in = report(labels, self._pictures, others, draws, self._numbers)
 
-        # One pixel of KITTI is the unit of all edges.
-        rows = np.zeros((len(shown_in), len(ImageDetections.COLUMNS)))
-        real = found.sources >= 0
-        rows[real] = seen.detections.rows()[found.sources[real]]
-        rows[:, ImageDetections.CLASS] = found.classes
-        rows[:, ImageDetections.CONFIDENCE] = found.scores
-        rows[:, ImageDetections.BOX] = np.trunc(found.edges) / scales[shown_in][:, None]
-        rows[:, ImageDetections.CAMERA] = shown_in
-        return rows[real], seen.objects[found.sources[real]], rows[~real]
+@compiled(brief=True)
+def lay_places(
+    live: Mask,
+    counts: Integers,
+    objects: Integers,
+    known: Integers,
+    numbers: Integers,
+    places: Integers,
+) -> None:
+    """Fill `places` (W, D) of the first `counts` (W,) of `objects` (W, D) among the first `known`
+    (W,) `numbers` (W, n).
+    """
+    for w in range(len(live)):
+        for n in range(counts[w] if live[w] else 0):
+            for place in range(known[w]):
+                if numbers[w, place] == objects[w, n]:
+                    places[w, n] = place
+
+
+@compiled(brief=True)
+def _copy_detected(live: Mask, seen: Detected, into: Detected) -> None:
+    """Copy the detections of the worlds that are `live`."""
+    for w in range(len(live)):
+        if live[w]:
+            into.counts[w] = seen.counts[w]
+            for n in range(seen.counts[w]):
+                into.objects[w, n] = seen.objects[w, n]
+                for k in range(seen.rows.shape[2]):
+                    into.rows[w, n, k] = seen.rows[w, n, k]
+
+
+@compiled()
+def _report(
+    live: Mask,
+    labels: Labels,
+    seen: Detected,
+    lasting: Lasting,
+    objects: Integers,
+    pictures: Floats,
+    focals: Floats,
+    numbers: Numbers,
+    false: Integers,
+    into: Detected,
+) -> None:
+    """See `KittiDetectors.detect`."""
+    for w in range(len(live)):
+        if not live[w]:
+            continue
+        count, true = objects[w], seen.counts[w] - false[w]
+        now = key_of(lasting.keys[w, 1], lasting.keyframes[w], 0, 0)
+        chance = Chance(lasting.keys[w, 0], now, lasting.beside[w, :count], lasting.scene[w])
+        draws = Draws(lasting.luck[w, :count], lasting.edges[w, :count], now, chance)
+        lent = _lent(seen.rows[w, true : seen.counts[w]], focals)
+        found, shown_in = report(labels_in(labels, w, true), pictures[w], lent, draws, numbers)
+
+        # Objects first.
+        reported = 0
+        for is_false in (False, True):
+            for n in range(len(shown_in)):
+                if is_false == (found.sources[n] < 0):
+                    _enter(seen, w, found, n, shown_in[n], focals, into, reported)
+                    reported += 1
+            if not is_false:
+                false[w] = len(shown_in) - reported
+        into.counts[w] = reported
+
+
+@compiled()
+def _enter(
+    seen: Detected,
+    world: int,
+    found: Boxes,
+    n: int,
+    camera: int,
+    focals: Floats,
+    into: Detected,
+    at: int,
+) -> None:
+    """Enter the box n of a world's reports in row `at` of the detections."""
+    source, row = found.sources[n], into.rows[world, at]
+    for k in range(len(row)):
+        row[k] = seen.rows[world, source, k] if source >= 0 else 0.0
+    row[_CLASS], row[_CONFIDENCE], row[_CAMERA] = found.classes[n], found.scores[n], camera
+    # One pixel of KITTI is the unit of all edges.
+    for j in range(EDGES):
+        row[_LEFT + j] = np.trunc(found.edges[n, j]) / (FOCAL_PX / focals[camera])
+    into.objects[world, at] = seen.objects[world, source] if source >= 0 else NO_OBJECT
+
+
+@compiled()
+def _lent(rows: Floats, focals: Floats) -> tuple[Integers, Floats, Integers]:
+    """Classes, edges and pictures of false boxes (l, 9), in pixels of KITTI."""
+    classes, cameras = np.empty((2, len(rows)), np.int64)
+    edges = np.empty((len(rows), EDGES))
+    for n in range(len(rows)):
+        classes[n], cameras[n] = int(rows[n, _CLASS]), int(rows[n, _CAMERA])
+        for j in range(EDGES):
+            edges[n, j] = rows[n, _LEFT + j] * (FOCAL_PX / focals[cameras[n]])
+    return classes, edges, cameras
 
 
 @compiled()

@@ -7,17 +7,22 @@ one is used changes no other.
 """
 
 import math
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from care_sim.base.compiled import compiled
 from care_sim.base.hashing import mixed
-from care_sim.core.arrays import Floats, Integers
+from care_sim.core.arrays import Floats, Integers, Mask, filled
+from care_sim.sensors.camera_faults import DrawnAhead
+
+_AHEAD = 16
+"""Keyframes for which numbers are drawn at once."""
 
 
 class PersistentNormals:
-    """Standard normal numbers (n, k), k of each of n objects.
+    """Standard normal numbers (W, n, k), k of each of n objects of W worlds.
 
     At a distance of t seconds column j has the correlation
     `lasting[j]` + `shares[j]` exp(-t / `times_s[j]`), and 1 at t = 0.
@@ -25,52 +30,76 @@ class PersistentNormals:
 
     def __init__(
         self,
-        objects: int,
+        worlds: int,
         lasting: ArrayLike,
         shares: ArrayLike,
         times_s: ArrayLike,
         keyframe_s: float,
-        rng: np.random.Generator,
     ):
         lasting, shares = np.asarray(lasting, float), np.asarray(shares, float)
         self._kept = np.exp(-keyframe_s / np.asarray(times_s, float))
-        self._share, self._fresh = np.sqrt(shares), np.sqrt(1 - lasting - shares)
-        self._rng = rng
-        always, self._slow = rng.standard_normal((2, objects, len(shares)))
-        self._always = np.sqrt(lasting) * always
-        self._started = False
+        self._lasting, self._share = np.sqrt(lasting), np.sqrt(shares)
+        self._fresh = np.sqrt(1 - lasting - shares)
+        self._always = self._slow = np.zeros((worlds, 0, len(shares)))
+        self._started = np.zeros(worlds, np.bool_)
+        self._draws = DrawnAhead(worlds, _AHEAD)
 
-    def next(self) -> Floats:
-        """(n, k) the numbers of the next keyframe."""
-        moves, fresh = self._rng.standard_normal((2, *self._slow.shape))
-        if self._started:
-            self._slow = self._kept * self._slow + np.sqrt(1 - self._kept**2) * moves
-        self._started = True
-        numbers: Floats = self._always + self._share * self._slow + self._fresh * fresh
+    def begin(self, world: int, objects: int, rng: np.random.Generator) -> None:
+        """Begin an episode with so many objects."""
+        always, slow = rng.standard_normal((2, objects, len(self._share)))
+        self._always = filled(self._always, world, self._lasting * always)
+        self._slow = filled(self._slow, world, slow)
+        self._started[world] = False
+        self._draws.begin(world, partial(_moves, rng, slow.shape))
+
+    def next(self, live: Mask) -> Floats:
+        """(W, n, k) the numbers of the next keyframe of the `live` worlds."""
+        drawn = self._draws.next(live, 2 * self._slow[0].size).reshape(*self._slow.shape, 2)
+        moved = self._kept * self._slow + np.sqrt(1 - self._kept**2) * drawn[..., 0]
+        self._slow = np.where((live & self._started)[:, None, None], moved, self._slow)
+        self._started |= live
+        numbers: Floats = self._always + self._share * self._slow + self._fresh * drawn[..., 1]
         return numbers
 
 
 class Renewals:
-    """The keyframe (...) since which each of many states lasts, in an array of any `shape`.
+    """The keyframe (W, n, k) since which each of k states of n objects of W worlds lasts.
 
     From one keyframe to the next a state stays with the chance exp(-keyframe / `time_s`), and else
     begins anew.
     """
 
-    def __init__(
-        self, shape: tuple[int, ...], time_s: float, keyframe_s: float, rng: np.random.Generator
-    ):
+    def __init__(self, worlds: int, states: int, time_s: float, keyframe_s: float):
         self._stays = math.exp(-keyframe_s / time_s)
-        self._rng = rng
-        self._begun = np.zeros(shape, np.int64)
-        self._keyframe = 0
+        self._begun = np.zeros((worlds, 0, states), np.int64)
+        self._keyframes = np.zeros((worlds, 1, 1), np.int64)
+        self._draws = DrawnAhead(worlds, _AHEAD)
 
-    def next(self) -> Integers:
-        """(...) the beginnings at the next keyframe."""
-        self._keyframe += 1
-        anew = self._rng.random(self._begun.shape) >= self._stays
-        self._begun = np.where(anew, self._keyframe, self._begun)
+    def begin(self, world: int, objects: int, rng: np.random.Generator) -> None:
+        """Begin an episode with so many objects."""
+        states = objects, self._begun.shape[2]
+        self._begun = filled(self._begun, world, np.zeros(states, np.int64))
+        self._keyframes[world] = 0
+        self._draws.begin(world, partial(_shares, rng, objects * states[1]))
+
+    def next(self, live: Mask) -> Integers:
+        """(W, n, k) the beginnings at the next keyframe of the `live` worlds."""
+        here = live[:, None, None]
+        self._keyframes += here
+        draws = self._draws.next(live, self._begun[0].size).reshape(self._begun.shape)
+        self._begun = np.where(here & (draws >= self._stays), self._keyframes, self._begun)
         return self._begun
+
+
+# No closures: copies of a world draw from copies of the generators.
+def _moves(rng: np.random.Generator, shape: tuple[int, ...], keyframes: int) -> Floats:
+    """(keyframes, ...) for each number its move and what is fresh, side by side."""
+    drawn = rng.standard_normal((keyframes, 2, *shape))
+    return np.moveaxis(drawn, 1, -1).reshape(keyframes, -1)
+
+
+def _shares(rng: np.random.Generator, states: int, keyframes: int) -> Floats:
+    return rng.random((keyframes, states))
 
 
 @compiled()

@@ -7,6 +7,7 @@ height (0.99). So here an object's box is its projected 3D box, cut at the pictu
 Pedestrians and two-wheelers fill a share of its width (`UNHIDDEN`): the sides move inwards by that.
 """
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -14,13 +15,18 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.pinhole import (
+    NEAR_M,
+    CameraModel,
+    MountedCameras,
+    PinholeCamera,
+    box_spans,
+    mounted_model,
+)
 from care_sim.core.rig import LIDAR_HEIGHT_M
-from care_sim.core.types import CLASSES
-from care_sim.sensors.annotated import IdentifiedDetections
+from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.sensors.camera_errors import UNHIDDEN
-from care_sim.sensors.false_boxes import box_areas
-from care_sim.sensors.kitti.numbers import CAR, KIND_OF
+from care_sim.sensors.kitti.numbers import CAR, FOCAL_PX, KIND_OF
 
 UNHIDDEN_SHARES = np.array([UNHIDDEN[name] for name in CLASSES])
 KINDS = np.array([KIND_OF[name] for name in CLASSES])
@@ -34,6 +40,9 @@ NEARER_M = 0.3
 """Only what is nearer by more than this covers an object."""
 _POINTS = 12
 """Points per side of the grid on which the covered share is counted."""
+# Compiled code can only read module-level constants.
+_CLASS, _LEFT, _CAMERA = ImageDetections.CLASS, ImageDetections.LEFT, ImageDetections.CAMERA
+_CAR_CLASS = CLASSES.index("car")
 
 
 class Labels(NamedTuple):
@@ -76,65 +85,113 @@ def pictures_of(cameras: Sequence[PinholeCamera], focal_px: float) -> Floats:
     return np.column_stack([pixels, heights / KITTI_CAMERA_M])
 
 
-def labels_of(
-    seen: IdentifiedDetections,
-    boxes: Floats,
-    places: Integers,
-    cameras: Sequence[PinholeCamera],
-    focal_px: float,
-) -> Labels:
-    """The objects of faultless detections `seen` (n,); `boxes` (n, 7) are their 3D boxes in the
-    sensor frame.
-    """
-    detections = seen.detections
-    kinds = KINDS[detections.classes]
-    scales = np.array([focal_px / camera.focal for camera in cameras])[detections.cameras, None]
-    sizes = np.array([(camera.width, camera.height) * 2 for camera in cameras])
-    whole = np.empty((len(seen), 4))
-    metres, depths = np.empty((2, len(seen)))
-    for number in set(detections.cameras.tolist()):
-        camera = cameras[number]
-        (own,) = np.nonzero(detections.cameras == number)
-        whole[own] = camera.project_boxes(boxes[own])
-        away = boxes[own, :3] - camera.position
-        metres[own], depths[own] = np.hypot(away[:, 0], away[:, 1]), away @ camera.axes[0]
-    whole = np.nan_to_num(whole) * scales
-    limits = sizes[detections.cameras] * scales
-    clipped = np.clip(whole, 0.0, limits)
-    cut = whole != clipped
-    areas = box_areas(clipped)
-    metres[detections.classes != CLASSES.index("car")] = 0.0
-    narrowed = _narrowed(clipped, cut, kinds, detections.classes)
+def room_for_labels(worlds: int, most: int) -> Labels:
+    """Tables (W, most, ...) of labels of so many worlds."""
+    room = worlds, most
+    whole = tuple(np.empty(room, np.int64) for _ in range(5))
+    classes, kinds, levels, cameras, places = whole
+    beyond, metres, cover = (np.empty(room) for _ in range(3))
+    boxes, cut = np.empty((*room, 4)), np.empty((*room, 4), np.bool_)
+    return Labels(classes, kinds, boxes, cut, levels, beyond, metres, cover, cameras, places)
+
+
+@compiled()
+def labels_in(labels: Labels, world: int, count: int) -> Labels:
+    """The labels of a world."""
     return Labels(
-        detections.classes,
-        kinds,
-        narrowed,
-        cut,
-        _levels(seen, detections.boxes * scales, areas),
-        1 - areas / np.maximum(box_areas(whole), 1.0),
-        metres,
-        covered(narrowed, depths, detections.cameras),
-        detections.cameras,
-        places,
+        labels.classes[world, :count],
+        labels.kinds[world, :count],
+        labels.boxes[world, :count],
+        labels.cut[world, :count],
+        labels.levels[world, :count],
+        labels.beyond[world, :count],
+        labels.metres[world, :count],
+        labels.cover[world, :count],
+        labels.cameras[world, :count],
+        labels.places[world, :count],
     )
 
 
-def _narrowed(boxes: Floats, cut: Mask, kinds: Integers, classes: Integers) -> Floats:
-    share = np.where(kinds == CAR, 1.0, UNHIDDEN_SHARES[classes])
-    inwards = (1 - share) / 2 * (boxes[:, 2] - boxes[:, 0])
-    narrowed = boxes.copy()
-    narrowed[:, 0] += np.where(cut[:, 0], 0.0, inwards)
-    narrowed[:, 2] -= np.where(cut[:, 2], 0.0, inwards)
-    return narrowed
+@compiled()
+def lay_labels(
+    live: Mask,
+    counts: Integers,
+    rows: Floats,
+    places: Integers,
+    visible: Floats,
+    boxes: Floats,
+    cameras: MountedCameras,
+    labels: Labels,
+) -> None:
+    """Fill `labels` (W, D, ...) with the objects of faultless detections, of the worlds that are
+    `live`: the first `counts` (W,) of `rows` (W, D, 9), with their `places` (W, D) among the 3D
+    `boxes` (W, n, 7) in the sensor frames. `visible` (W, D) are annotated shares; without columns
+    they are read off the boxes.
+    """
+    for w in range(len(live)):
+        if not live[w]:
+            continue
+        own = labels_in(labels, w, counts[w])
+        depths = np.empty(counts[w])
+        for n in range(counts[w]):
+            share = visible[w, n] if visible.shape[1] else math.nan
+            box = boxes[w, places[w, n] : places[w, n] + 1]
+            number = int(rows[w, n, _CAMERA])
+            own.cameras[n], own.places[n] = number, places[w, n]
+            camera = mounted_model(cameras, w, number)
+            depths[n] = _lay_label(n, rows[w, n], share, box, camera, cameras.sizes[number], own)
+        hidden = covered(own.boxes, depths, own.cameras)
+        for n in range(counts[w]):
+            own.cover[n] = hidden[n]
 
 
-def _levels(seen: IdentifiedDetections, pixels: Floats, areas: Floats) -> Integers:
-    shares = seen.visible
-    if shares is None:
-        unhidden = np.maximum(areas * UNHIDDEN_SHARES[seen.detections.classes], 1.0)
-        shares = box_areas(pixels) / unhidden
-    levels: Integers = np.sum([shares < least for least in LEAST_SHARES], axis=0)
-    return levels
+@compiled()
+def _lay_label(
+    n: int,
+    row: Floats,
+    visible: float,
+    box: Floats,
+    camera: CameraModel,
+    size: Integers,
+    labels: Labels,
+) -> float:
+    """Fill the label n of an object with a 3D box (1, 7), but for its cover; return its depth. A
+    `visible` share of NaN is read off the boxes.
+    """
+    label = int(row[_CLASS])
+    kind, unhidden = KINDS[label], UNHIDDEN_SHARES[label]
+    labels.classes[n], labels.kinds[n] = label, kind
+    scale = FOCAL_PX / camera.focal
+    whole, clipped, pixels = np.empty(4), labels.boxes[n], np.empty(4)
+    span = box_spans(box, camera, NEAR_M)
+    for j in range(4):
+        # A box wholly behind the camera spans nothing.
+        whole[j] = (0.0 if math.isnan(span[0, j]) else span[0, j]) * scale
+        pixels[j] = row[_LEFT + j] * scale
+        clipped[j] = min(max(whole[j], 0.0), size[j % 2] * scale)
+        labels.cut[n, j] = whole[j] != clipped[j]
+    area = _area(clipped)
+    labels.beyond[n] = 1 - area / max(_area(whole), 1.0)
+    share = _area(pixels) / max(area * unhidden, 1.0) if math.isnan(visible) else visible
+    labels.levels[n] = 0
+    for least in LEAST_SHARES:
+        labels.levels[n] += share < least
+
+    # The sides move inwards, where the picture does not cut them.
+    inwards = 0.0 if kind == CAR else (1 - unhidden) / 2 * (clipped[2] - clipped[0])
+    clipped[0] += 0.0 if labels.cut[n, 0] else inwards
+    clipped[2] -= 0.0 if labels.cut[n, 2] else inwards
+
+    x, y, z = box[0, 0] - camera.position[0], box[0, 1] - camera.position[1], box[0, 2]
+    labels.metres[n] = math.hypot(x, y) if label == _CAR_CLASS else 0.0
+    axis = camera.axes[0]
+    return float(axis[0] * x + axis[1] * y + axis[2] * (z - camera.position[2]))
+
+
+@compiled()
+def _area(box: Floats) -> float:
+    """Square pixels of an image box (4,)."""
+    return float(max(box[2] - box[0], 0.0) * max(box[3] - box[1], 0.0))
 
 
 @compiled()
