@@ -321,16 +321,16 @@ class SpeedPlan:
     def _speeds(self) -> Floats:
         bends = np.array([abs(self.route.curvature(s)) for s in self._places.tolist()])
         with np.errstate(divide="ignore"):
-            speeds = np.minimum(self.cruise_mps, np.sqrt(self.sideways_mps2 / bends))
+            speeds = np.minimum(self.cruise_mps, np.sqrt(self.sideways_mps2 / bends)).tolist()
         # v^2 grows by 2 a per metre: from each place on, and back from each.
         for here in range(1, len(speeds)):
             speeds[here] = min(speeds[here], self._reached(speeds[here - 1]))
         for here in range(len(speeds) - 2, -1, -1):
             speeds[here] = min(speeds[here], self._reached(speeds[here + 1]))
-        return speeds
+        return np.array(speeds)
 
     def _reached(self, speed: float) -> float:
-        return float(np.sqrt(speed**2 + 2 * self.comfort_mps2 * _SPACING_M))
+        return math.sqrt(speed**2 + 2 * self.comfort_mps2 * _SPACING_M)
 
 
 def _seconds_between(places: Floats, speeds: Floats) -> Floats:
