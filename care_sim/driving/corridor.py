@@ -1,7 +1,5 @@
 """Tracks as they lie along the way that the car is to go."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from care_sim.base.compiled import compiled
@@ -30,15 +28,14 @@ def along_route(tracks: Tracks, route: Route, sensor: Frame) -> Tracks:
     if not len(tracks):
         return tracks
     boxes = sensor.boxes_to_world(tracks.boxes)
-    own, *theirs = route.places(np.vstack([[sensor.x, sensor.y], boxes[:, :2]]))
-    s, d, heading = np.array(theirs).T
-    turn = heading - sensor.yaw
-    straight: Floats = boxes.copy()
-    straight[:, 0] = s - own[0]
-    straight[:, 1] = d - own[1]
-    straight[:, 2] = tracks.boxes[:, 2]
-    straight[:, 6] = boxes[:, 6] - heading
-    return replace(tracks, boxes=straight, velocities=turned(tracks.velocities, -turn))
+    found = route.places(np.vstack([[sensor.x, sensor.y], boxes[:, :2]]))
+    headings = found[1:, 2]
+    rows = tracks.rows().copy()
+    straight = rows[:, Tracks.BOX]
+    straight[:, :2] = found[1:, :2] - found[0, :2]
+    straight[:, 6] = boxes[:, 6] - headings
+    rows[:, Tracks.VELOCITY] = turned(tracks.velocities, -(headings - sensor.yaw))
+    return Tracks.from_checked_rows(rows)
 
 
 def enters_strip(ahead: Tracks, front_m: float, reach_m: float, horizon_s: float = 0.0) -> Mask:

@@ -13,55 +13,42 @@ has shown that actor nor a detection has held its returns.
 import numpy as np
 
 from care_sim.base.times import LAST_BITS_S
-from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.conditions import DriverSettings
-from care_sim.core.frames import Frame
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.frames import Frame, turned
 from care_sim.core.types import Tracks
 from care_sim.driving.corridor import along_route, enters_strip
+from care_sim.world.bullet import NO_BODY
 from care_sim.world.contact import least_gap
 from care_sim.world.world import World
 
 
-class NeedlessBraking:
-    """Judges the brake of one episode. `front_m` is how far the ego reaches ahead of its sensor,
-    `reach_m` half of the strip that its driver guards, metres.
-    """
+def in_the_way(
+    world: World, sensor: Frame, front_m: float, reach_m: float, horizon_s: float
+) -> Integers:
+    """Return (n,) the bodies that are in a strip ahead, as `enters_strip` says. Truth."""
+    bodies = np.array([actor.body for actor in world.actors], np.int64)
+    rows = np.zeros((len(bodies), len(Tracks.COLUMNS)))
+    rows[:, Tracks.BOX] = sensor.boxes_to_local(world.boxes_of(bodies))
+    rows[:, Tracks.VELOCITY] = turned(world.velocities_of(bodies), -sensor.yaw)
+    true = Tracks.from_checked_rows(rows)
+    ahead = true if world.route is None else along_route(true, world.route, sensor)
+    return np.asarray(bodies[enters_strip(ahead, front_m, reach_m, horizon_s)])
 
-    def __init__(self, front_m: float, reach_m: float, rules: DriverSettings):
-        self._front_m = front_m
-        self._reach_m = reach_m
-        self._rules = rules
+
+class NeedlessBraking:
+    """Judges the brake of one episode, which a driver lets go `release_s` after the last need."""
+
+    def __init__(self, release_s: float):
+        self._release_s = release_s
         self._needed_s = -np.inf
 
-    def judge(self, world: World, sensor: Frame, braking: bool) -> bool:
-        """Whether the brake is on for nothing; to be asked at every keyframe."""
-        return self._judged(world, braking, braking and self._is_needed(world, sensor))
-
-    def _judged(self, world: World, braking: bool, needed: bool) -> bool:
+    def judge(self, time: float, braking: bool, needed: bool) -> bool:
+        """Return whether the brake is on for nothing; call this at every keyframe."""
         if not braking:
             return False
         if needed:
-            self._needed_s = world.time
-        return world.time - self._needed_s > self._rules.brake_release_s + LAST_BITS_S
-
-    def _is_needed(self, world: World, sensor: Frame, unseen: int | None = None) -> bool:
-        bodies = _bodies(world, unseen)
-        count = np.zeros(len(bodies), np.int64)
-        true = Tracks(
-            bodies,
-            count,
-            sensor.boxes_to_local(world.boxes_of(bodies)),
-            sensor.vectors_to_local(
-                np.column_stack([world.velocities_of(bodies), np.zeros(len(bodies))])
-            )[:, :2],
-            count,
-            count,
-        )
-        ahead = true if world.route is None else along_route(true, world.route, sensor)
-        return bool(self._enters(ahead).any())
-
-    def _enters(self, ahead: Tracks) -> Mask:
-        return enters_strip(ahead, self._front_m, self._reach_m, self._rules.brake_horizon_s)
+            self._needed_s = time
+        return time - self._needed_s > self._release_s + LAST_BITS_S
 
 
 class UnfoundedBraking(NeedlessBraking):
@@ -73,34 +60,25 @@ class UnfoundedBraking(NeedlessBraking):
     def judge_tracks(
         self,
         world: World,
-        sensor: Frame,
-        tracks: Tracks,
-        ahead: Tracks,
+        entering: Floats,
+        bodies: Integers,
         braking: bool,
         in_view: bool,
         behind: Integers,
     ) -> bool:
-        """Return whether the braking is needless; call this at every keyframe. `tracks` are in the
-        sensor frame, and `ahead` are the same tracks as the driver takes them. `behind` (n,) are
-        the bodies behind the detections. `in_view` says whether a camera shows the first-sighting
-        actor.
+        """Return whether the braking is unfounded; call this at every keyframe. `entering` (n, 7)
+        are the world boxes of tracks in the way, and `bodies` (m,) are those `in_the_way`. `behind`
+        (k,) are the bodies behind the detections. `in_view` says whether a camera shows the
+        first-sighting actor.
         """
         target = world.first_sighting
         self._has_met |= in_view or (target is not None and target.body in behind)
-        if not braking:
-            return False
-        unseen = None if self._has_met or target is None else target.body
-        needed = self._is_needed(world, sensor, unseen) or _touch(
-            sensor.boxes_to_world(tracks.boxes[self._enters(ahead)]),
-            world.boxes_of(_bodies(world, unseen)),
-        )
-        return self._judged(world, True, needed)
+        unseen = NO_BODY if self._has_met or target is None else target.body
+        needed = braking and bool((bodies != unseen).any() or _touch(entering, world, unseen))
+        return self.judge(world.time, braking, needed)
 
 
-def _bodies(world: World, unseen: int | None) -> Integers:
-    return np.array([actor.body for actor in world.actors if actor.body != unseen], np.int64)
-
-
-def _touch(boxes: Floats, others: Floats) -> bool:
-    """Whether one of `boxes` (n, 7) may touch one of `others` (m, 7), seen from above."""
+def _touch(boxes: Floats, world: World, unseen: int) -> bool:
+    """Whether one of `boxes` (n, 7) may touch an actor other than `unseen`, seen from above."""
+    others = world.boxes([actor for actor in world.actors if actor.body != unseen])
     return any(least_gap(box, other) <= 0 for box in boxes for other in others)

@@ -13,6 +13,7 @@ import numpy as np
 
 from care_sim.base.checks import bounded, check_flag, one_of
 from care_sim.base.errors import InvalidInput
+from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats
 from care_sim.core.frames import Pose
 from care_sim.scenarios.base import LONGEST_EPISODE_S, Scenario
@@ -27,12 +28,15 @@ from care_sim.world.lane_flow import Crossing, FlowingLane, LaneFlow, StreetTraf
 from care_sim.world.motions import Crosser, Meeting, Walk
 from care_sim.world.route import SpeedPlan
 from care_sim.world.traffic import Traffic
-from care_sim.world.world import WORLD_STEP_S, Motion, World
+from care_sim.world.world import WORLD_STEP_S, Member, World
 
 CLEAR_M = 0.5
 """Least expected distance from other traffic when a comer sets off."""
 LOOK_AHEAD_STEP_S = 0.1
 """Time between two such checks."""
+
+_BETWEEN = round(SAMPLE_S / WORLD_STEP_S)
+"""World steps from sample to sample."""
 
 
 SIDES = {"left": 1, "right": -1}
@@ -102,42 +106,38 @@ def _flowing(drive: Drive, lane: DrivenLane) -> FlowingLane:
 
 def _add_bodies(world: World, drive: Drive) -> None:
     """Add everything that stands or walks on its own."""
-    for kind, way in zip(drive.kinds, drive.ways, strict=True):
-        stands = bool((way == way[0]).all())
+    walking = _Ways(drive.ways)
+    for number, (kind, way) in enumerate(zip(drive.kinds, drive.ways, strict=True)):
         x, y, heading = way[0].tolist()
-        world.add(kind, kind, (x, y, heading) if stands else _walking(way))
+        stands = bool((way == way[0]).all())
+        world.add(kind, kind, (x, y, heading) if stands else Member(walking.poses_at, number))
 
 
-def _walking(way: Floats) -> Motion:
-    """The motion along a way (t, 3) that is sampled every SAMPLE_S."""
-    # Between two samples evenly, heading as at the first. Looked up at every step: worked out once.
-    between = round(SAMPLE_S / WORLD_STEP_S)
-    shares = np.arange(between)[:, None] / between
-    moved = way[:-1, None, :2] + shares * np.diff(way[:, :2], axis=0)[:, None]
-    headings = np.repeat(way[:-1, 2], between)
-    xs, ys = moved.reshape(-1, 2).T.tolist()
-    return _Way(tuple(zip(xs, ys, headings.tolist(), strict=True)))
+class _Ways:
+    """The motions along `ways` (n, t, 3) that are sampled every SAMPLE_S."""
 
+    def __init__(self, ways: Floats):
+        self._samples = np.ascontiguousarray(ways.swapaxes(0, 1))
 
-@dataclass(frozen=True)
-class _Way:
-    """A motion through `poses`, one per world step."""
-
-    poses: tuple[Pose, ...]
-
-    def __call__(self, time: float) -> Pose:
-        return self.poses[min(round(time / WORLD_STEP_S), len(self.poses) - 1)]
+    def poses_at(self, time: float) -> Floats:
+        """(n, 3) the poses at `time`."""
+        # Between two samples evenly, heading as at the first.
+        steps = min(round(time / WORLD_STEP_S), _BETWEEN * (len(self._samples) - 1) - 1)
+        sample, step = divmod(steps, _BETWEEN)
+        poses = self._samples[sample].copy()
+        poses[:, :2] += step / _BETWEEN * (self._samples[sample + 1, :, :2] - poses[:, :2])
+        return poses
 
     def __deepcopy__(self, _copied: dict[int, object]) -> Self:
-        # Poses never change, and copying thousands of them takes most of the time of a copy.
+        # Ways never change.
         return self
 
 
 def _add_vehicles(world: World, drive: Drive, traffic: StreetTraffic) -> None:
     """The traffic, which sees the ego where it is at every step."""
-    for number, lane in enumerate(drive.lanes):
-        for place, kind in enumerate(lane.kinds):
-            world.add(f"driven {kind}", kind, partial(traffic.pose_at, number, place))
+    kinds = [kind for lane in drive.lanes for kind in lane.kinds]
+    for number, kind in enumerate(kinds):
+        world.add(f"driven {kind}", kind, Member(traffic.poses_at, number))
     world.at_every_step(partial(_drive_on, traffic))
 
 
@@ -188,6 +188,9 @@ def _crossing(crosser: Crosser, one: Encounter, lane: DrivenLane) -> Crossing:
 
 def _look(crosser: Crosser, plan: SpeedPlan, line_m: float, world: World) -> None:
     """Let a crosser watch the ego, whose middle is on the line at `line_m` along the route."""
+    # No car is faster than its plan: nobody decides while it is too far away.
+    if line_m - world.along_m > plan.cruise_mps * (crosser.lead_s + LAST_BITS_S):
+        return
     crosser.look(world.time, lambda: _seconds_left(world, plan, line_m))
 
 

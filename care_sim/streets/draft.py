@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.core.arrays import Floats, Mask
+from care_sim.core.arrays import Floats, Mask, longer
 from care_sim.world.bodies import CATALOGUE
 
 Footprint = tuple[float, float]
@@ -40,14 +40,12 @@ def _each_meets(
 
 
 @compiled()
-def meets_any(
-    way: Floats, size: Footprint, ways: Floats, bounds: Floats, sizes: Floats, berths: Floats
-) -> bool:
+def meets_any(way: Floats, size: Footprint, ways: Floats, others: Floats) -> bool:
     """Return True if a footprint on `way` (1 or t, 3) ever comes closer than its berth to others,
     along every axis.
 
-    The others are on `ways` (n, 1 or t, 3), within `bounds` (n, 4) of `way_bounds`, with `sizes`
-    (n, 2) and `berths` (n,). Standing bodies have a way of one pose.
+    The `others` (n, 7) are on `ways` (n, 1 or t, 3): bounds of `way_bounds`, sizes and berths.
+    Standing bodies have a way of one pose.
     """
     left, low, right, high = way_bounds(way)
     times = max(len(way), ways.shape[1])
@@ -56,17 +54,18 @@ def meets_any(
         # Rectangles that touch have centres no farther apart than half of both diagonals. The exact
         # test moves every side out by the berth, and a corner then moves by sqrt(2) berths at most,
         # at a right angle.
-        diagonals = math.hypot(sizes[n, 0], sizes[n, 1]) + math.hypot(size[0], size[1])
-        reach = diagonals / 2 + math.sqrt(2) * berths[n]
-        across = max(bounds[n, 0] - right, left - bounds[n, 2])
-        along = max(bounds[n, 1] - high, low - bounds[n, 3])
+        bounds, other, berth = others[n, :4], others[n, 4:6], others[n, 6]
+        diagonals = math.hypot(other[0], other[1]) + math.hypot(size[0], size[1])
+        reach = diagonals / 2 + math.sqrt(2) * berth
+        across = max(bounds[0] - right, left - bounds[2])
+        along = max(bounds[1] - high, low - bounds[3])
         if max(across, along) >= reach:
             continue
         for time in range(times):
             mine, theirs = min(time, len(way) - 1), min(time, ways.shape[1] - 1)
             x, y = ways[n, theirs, 0] - way[mine, 0], ways[n, theirs, 1] - way[mine, 1]
             if x * x + y * y < reach * reach and _rectangles_meet(
-                way[mine], size, ways[n, theirs], sizes[n], berths[n]
+                way[mine], size, ways[n, theirs], other, berth
             ):
                 return True
     return False
@@ -121,24 +120,26 @@ class PlacedBodies:
     """
 
     def __init__(self) -> None:
+        self._count = 0
         self._ways: Floats = np.empty((0, 1, 3))
-        self._bounds: Floats = np.empty((0, 4))
-        self._sizes: Floats = np.empty((0, 2))
-        self._berths: Floats = np.empty(0)
+        # Bounds, sizes and berths.
+        self._rows: Floats = np.empty((0, 7))
 
     def add(self, way: Floats, size: Footprint, berth: float) -> None:
         """Add a footprint, which others pass at `berth` metres or more."""
-        ways = self._ways if len(self._ways) else np.empty((0, *way.shape))
-        self._ways = np.concatenate([ways, way[None]])
-        self._bounds = np.vstack([self._bounds, way_bounds(way)])
-        self._sizes = np.vstack([self._sizes, size])
-        self._berths = np.append(self._berths, berth)
+        if self._count == len(self._rows):
+            room = 2 * self._count + 8
+            self._ways = longer(self._ways.reshape(1, -1, *way.shape), room)[0]
+            self._rows = longer(self._rows[None], room)[0]
+        self._ways[self._count] = way
+        self._rows[self._count] = *way_bounds(way), *size, berth
+        self._count += 1
 
     def meets(self, way: Floats, size: Footprint) -> bool:
         """Whether a footprint on `way` (1, 3) or (t, 3) ever comes closer to one of these than its
         berth, along every axis.
         """
-        return bool(meets_any(way, size, self._ways, self._bounds, self._sizes, self._berths))
+        return bool(meets_any(way, size, self._ways[: self._count], self._rows[: self._count]))
 
 
 TOUCH_M = 0.01

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats
-from care_sim.core.frames import Pose, turned
+from care_sim.core.frames import Pose
 
 Range = tuple[float, float]
 """Low and high. The seed draws uniformly between them."""
@@ -56,24 +57,56 @@ class Curve:
 
     def to_world(self, places: Floats) -> Floats:
         """World poses (..., 3: x, y, heading) of places (..., 3: s, d, heading) on the road."""
-        places = np.asarray(places, dtype=float)
-        s, d, heading = places[..., 0], places[..., 1], places[..., 2]
-        along = np.minimum(np.maximum(s - self.bend_at, 0.0), self.bend_length)
-        turn = self.curvature * along
-        # The chord of a circle's arc, 2 R sin(turn / 2) with the radius R = along / turn. NumPy's
-        # sinc(x) is sin(pi x) / (pi x) and 1 at 0, where the road is straight and R infinite.
-        chord = along * np.sinc(turn / (2 * np.pi)) if self.curvature else along
-        before = np.minimum(s, self.bend_at)
-        after = np.maximum(s - self.bend_at - self.bend_length, 0.0)
+        rows = np.ascontiguousarray(places, dtype=float)
+        turns = _AHEAD
+        if self.curvature:
+            along = np.minimum(np.maximum(rows[..., 0] - self.bend_at, 0.0), self.bend_length)
+            turns = _turns(self.curvature * along.ravel())
+        x, y, heading = map(float, self.start)
+        start = x, y, heading, float(np.cos(heading)), float(np.sin(heading))
+        bend = float(self.bend_at), float(self.bend_length)
+        return np.asarray(_placed(rows.reshape(-1, 3), turns, bend, start).reshape(rows.shape))
+
+
+def _turns(turns: Floats) -> Floats:
+    """Return (6, n) turns (n,) of a line since its start, the shares that their chords have of
+    their arcs, the cosines and sines of half of them, and of them.
+    """
+    # The chord of a circle's arc is 2 R sin(turn / 2) with the radius R = along / turn. NumPy's
+    # sinc(x) is sin(pi x) / (pi x) and 1 at 0, where the road is straight and R infinite.
+    half = turns / 2
+    shares = np.sinc(turns / (2 * np.pi))
+    return np.array([turns, shares, np.cos(half), np.sin(half), np.cos(turns), np.sin(turns)])
+
+
+_AHEAD = _turns(np.zeros(1))
+"""The line of a straight road turns nowhere."""
+
+
+@compiled()
+def _placed(
+    rows: Floats,
+    turns: Floats,
+    bend: tuple[float, float],
+    start: tuple[float, float, float, float, float],
+) -> Floats:
+    """Return `Curve.to_world` of rows (n, 3). The columns of `turns` are those of `_turns` at each
+    row, or one for all. `start` is x, y, heading, and the heading's cosine and sine.
+    """
+    world = np.empty(rows.shape)
+    for n in range(len(rows)):
+        s, d, heading = rows[n]
+        turn, share, cos_half, sin_half, cos, sin = turns[:, min(n, turns.shape[1] - 1)]
         # Three parts, one after the other: the straight before lies along x, the chord at half the
         # turn, the straight after at the whole turn. d goes to the left of where the line points.
-        cos, sin = np.cos(turn), np.sin(turn)
-        world = np.empty(places.shape)
-        world[..., 0] = before + chord * np.cos(turn / 2) + after * cos - d * sin
-        world[..., 1] = chord * np.sin(turn / 2) + after * sin + d * cos
-        world[..., 2] = self.start[2] + turn + heading
-        world[..., :2] = turned(world[..., :2], self.start[2]) + self.start[:2]
-        return world
+        chord = min(max(s - bend[0], 0.0), bend[1]) * share
+        after = max(s - bend[0] - bend[1], 0.0)
+        x = min(s, bend[0]) + chord * cos_half + after * cos - d * sin
+        y = chord * sin_half + after * sin + d * cos
+        world[n, 0] = start[3] * x - start[4] * y + start[0]
+        world[n, 1] = start[4] * x + start[3] * y + start[1]
+        world[n, 2] = start[2] + turn + heading
+    return world
 
 
 PAVEMENT_M: Range = (PAVEMENT_WIDTH_M, 4.0)

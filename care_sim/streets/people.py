@@ -2,6 +2,7 @@
 a yard or a garden.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -68,26 +69,28 @@ class Walked:
     def poses(self, times: Floats) -> Floats:
         """World poses (t, 3) at `times` (t,)."""
         points = self._points()
-        legs = np.diff(points, axis=0)
+        legs = points[1:] - points[:-1]
         # Metres done at every point of the way, and by the walker at every time.
-        covered = np.concatenate([[0.0], np.cumsum(np.hypot(*legs.T))])
-        way = np.clip(self.speed * (times - self.starts_s), 0.0, covered[-1])
+        covered = np.zeros(len(points))
+        np.cumsum(np.hypot(legs[:, 0], legs[:, 1]), out=covered[1:])
+        way = np.minimum(np.maximum(self.speed * (times - self.starts_s), 0.0), covered[-1])
         # A walker at the end still faces along the last leg.
-        leg = np.clip(np.searchsorted(covered, way, side="right") - 1, 0, len(legs) - 1)
-        x, y = (np.interp(way, covered, points[:, axis]) for axis in (0, 1))
-        return np.column_stack([x, y, np.arctan2(legs[leg, 1], legs[leg, 0])])
+        leg = legs[np.minimum(covered[1:].searchsorted(way, side="right"), len(legs) - 1)]
+        poses = np.empty((len(times), 3))
+        for axis in (0, 1):
+            poses[:, axis] = np.interp(way, covered, points[:, axis])
+        poses[:, 2] = np.arctan2(leg[:, 1], leg[:, 0])
+        return poses
 
     def _points(self) -> Floats:
         """(n, 2) world points of the way, about a stride apart at most, to follow bends."""
-        places = [np.array([self.corners[0]])]
+        places = [np.array([(*self.corners[0], 0.0)])]
         for start, end in zip(self.corners, self.corners[1:], strict=False):
-            pieces = max(
-                int(np.ceil(np.hypot(end[0] - start[0], end[1] - start[1]) / self.STRIDE_M)), 1
-            )
-            shares = np.arange(1, pieces + 1) / pieces
-            places.append(np.array(start) + shares[:, None] * (np.array(end) - start))
-        road = np.concatenate(places)
-        return self.curve.to_world(np.column_stack([road, np.zeros(len(road))]))[:, :2]
+            ahead, aside = end[0] - start[0], end[1] - start[1]
+            pieces = max(math.ceil(np.hypot(ahead, aside) / self.STRIDE_M), 1)
+            shares = np.arange(1, pieces + 1)[:, None] / pieces
+            places.append((*start, 0.0) + shares * (ahead, aside, 0.0))
+        return self.curve.to_world(np.concatenate(places))[:, :2]
 
 
 def populate(draft: Draft, road: Road, span: Span) -> None:

@@ -17,7 +17,6 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats
-from care_sim.core.frames import Pose
 from care_sim.world.motions import Crosser
 
 MOST_MPS2 = 6.0
@@ -47,25 +46,21 @@ class LaneFlow:
         """Let every driver decide, then move all by `dt` seconds. `others` are place and speed of
         other things in the lane, such as the ego.
         """
-        accelerations = self._accelerations(others)
-        self.places += self.speeds * dt
-        self.speeds = np.maximum(self.speeds + accelerations * dt, 0.0)
-
-    def _accelerations(self, others: Sequence[tuple[float, float]]) -> Floats:
-        """(n,) m/s^2."""
         # The power is NumPy's, as compiled code may round it differently.
         free = 1 - (self.speeds / self._wanted) ** EXPONENT
         ahead = np.array(others, float).reshape(-1, 2)
-        return np.asarray(_following(free, self.places, self.speeds, ahead))
+        self.places, self.speeds = _moved(free, self.places, self.speeds, ahead, dt)
 
 
 @compiled(error_model="numpy")
-def _following(free: Floats, places: Floats, speeds: Floats, others: Floats) -> Floats:
-    """(n,) the accelerations of drivers at `places` with `speeds`, who follow each other and
-    `others` (m, 2), places and speeds. `free` are the shares of their acceleration that each would
-    take on a free road.
+def _moved(
+    free: Floats, places: Floats, speeds: Floats, others: Floats, dt: float
+) -> tuple[Floats, Floats]:
+    """(n,) places and speeds after `dt` seconds of drivers at `places` with `speeds`, who follow
+    each other and `others` (m, 2), places and speeds. `free` are the shares of their acceleration
+    that each would take on a free road.
     """
-    accelerations = np.empty(len(places))
+    moved = np.empty(len(places))
     for n in range(len(places)):
         # The vehicle ahead is the nearest with a greater place, the first of equally near ones.
         gap, lead_mps = math.inf, 0.0
@@ -84,8 +79,9 @@ def _following(free: Floats, places: Floats, speeds: Floats, others: Floats) -> 
             + closing / (2 * math.sqrt(GAINING_MPS2 * BRAKING_MPS2))
         )
         wanted = GAINING_MPS2 * free[n] - GAINING_MPS2 * (wished / gap) ** 2
-        accelerations[n] = min(max(wanted, -MOST_MPS2), MOST_MPS2)
-    return accelerations
+        acceleration = min(max(wanted, -MOST_MPS2), MOST_MPS2)
+        moved[n] = max(speeds[n] + acceleration * dt, 0.0)
+    return places + speeds * dt, moved
 
 
 @dataclass(frozen=True)
@@ -157,10 +153,9 @@ class StreetTraffic:
         self.lanes = tuple(lanes)
         self._poses = self._poses_now()
 
-    def pose_at(self, lane: int, number: int, _time: float) -> Pose:
-        """Return the world pose now of a vehicle, by the numbers of its lane and within it."""
-        x, y, heading = self._poses[lane][number]
-        return x, y, heading
+    def poses_at(self, _time: float) -> Floats:
+        """Return (n, 3) the world poses now of all vehicles, lane by lane."""
+        return self._poses
 
     def step(self, dt: float, time: float, ego_m: float, ego_speed: float) -> None:
         """Move all by `dt` seconds, to `time`, with the ego `ego_m` along its route."""
@@ -168,7 +163,6 @@ class StreetTraffic:
             lane.flow.step(dt, lane.others(time, ego_m, ego_speed))
         self._poses = self._poses_now()
 
-    def _poses_now(self) -> list[list[list[float]]]:
-        """World poses by lane and vehicle."""
-        # Each is looked up alone: of plain lists that takes a third of the time.
-        return [lane.poses_at(lane.flow.places).tolist() for lane in self.lanes]
+    def _poses_now(self) -> Floats:
+        poses = [lane.poses_at(lane.flow.places) for lane in self.lanes]
+        return np.concatenate([np.empty((0, 3)), *poses])

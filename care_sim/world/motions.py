@@ -78,11 +78,12 @@ class Crosser:
     walk: Walk
     went: bool | None
     """Whether it set off; None before the decision."""
+    lead_s: float
 
     def __init__(self, walk: Walk, lead_s: float, may_go: Callable[[Walk], bool]):
         self.walk = walk
         self.went = None
-        self._lead_s = lead_s
+        self.lead_s = lead_s
         self._may_go = may_go
 
     def look(self, time: float, seconds_left: Callable[[], float]) -> None:
@@ -92,10 +93,10 @@ class Crosser:
         if self.went is not None:
             return
         left = seconds_left()
-        if left > self._lead_s:
+        if left > self.lead_s:
             return
         # World steps have a length: the exact moment to set off was within the last step.
-        self.walk = self.walk.setting_off(time - (self._lead_s - left))
+        self.walk = self.walk.setting_off(time - (self.lead_s - left))
         self.went = self._may_go(self.walk)
 
     def pose(self, time: float) -> Pose:

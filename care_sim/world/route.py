@@ -1,15 +1,18 @@
 """Routes of a car: a sequence of straights and bends of constant curvature."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from care_sim.base.checks import check_number
+from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput
-from care_sim.core.arrays import Floats
-from care_sim.core.frames import Pose, turned
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.frames import Pose
 
 Leg = tuple[float, float]
 """Length in metres and curvature in 1/m, positive to the left; 0 is a straight."""
@@ -20,6 +23,8 @@ _STRAIGHT_PER_M = 1e-12
 """Smaller curvatures count as straight: their radius may not be a number."""
 _FAR_M = 1e6
 """Length of the straights before the first leg and after the last one, practically endless."""
+_SLACK_M = 1e-3
+"""More than rounding moves a bound of a distance."""
 
 
 @dataclass(frozen=True)
@@ -56,21 +61,25 @@ class Route:
 
     def places(self, points: Floats) -> Floats:
         """(n, 3) `s`, `d` and the line's heading where it comes nearest to world points (n, 2)."""
-        # All legs at once, as rows of arrays (legs, n): a bend of the protocols is 33 of them.
-        starts, begins, lengths, curvatures = self._columns
-        turned_back = turned(points - starts[:, None, :2], -starts[:, 2, None])
-        x, y = turned_back[..., 0], turned_back[..., 1]
-        along = x.copy()
-        bends = np.abs(curvatures[:, 0]) >= _STRAIGHT_PER_M
-        along[bends] = _along_arc(x[bends], y[bends], lengths[bends], curvatures[bends])
-        along = np.clip(along, 0.0, lengths)
-        heading = curvatures * along
-        foot_x, foot_y = _chord(along, curvatures)
-        off_x, off_y = x - foot_x, y - foot_y
-        d = np.cos(heading) * off_y - np.sin(heading) * off_x
-        found = np.stack([begins + along, d, starts[:, 2, None] + heading], axis=-1)
-        nearest = np.argmin(off_x**2 + off_y**2, axis=0)
-        return np.asarray(found[nearest, np.arange(len(points))])
+        legs = self._columns
+        squares, found, nearest, near = _on_straights(np.ascontiguousarray(points), legs)
+        if len(near):
+            # A bend's sines and cosines are NumPy's, of the few points that a bend may be near.
+            (begins, lengths, curvatures), middles = legs.places[near[:, 1]].T, points[near[:, 0]]
+            starts, (cos, sin) = legs.starts[near[:, 1]], legs.turns[near[:, 1]].T
+            x, y = (middles - starts[:, :2]).T
+            x, y = cos * x - sin * y, sin * x + cos * y
+            along = x.copy()
+            bends = np.abs(curvatures) >= _STRAIGHT_PER_M
+            along[bends] = _along_arc(x[bends], y[bends], lengths[bends], curvatures[bends])
+            along = np.clip(along, 0.0, lengths)
+            heading = curvatures * along
+            foot_x, foot_y = _chord(along, curvatures)
+            off_x, off_y = x - foot_x, y - foot_y
+            d = np.cos(heading) * off_y - np.sin(heading) * off_x
+            on_bends = np.column_stack([begins + along, d, starts[:, 2] + heading])
+            _take_nearer(squares, found, nearest, near, off_x**2 + off_y**2, on_bends)
+        return np.asarray(found)
 
     def _leg(self, s: float) -> "_PlacedLeg":
         return next(leg for leg in self._legs if s < leg.begins + leg.length)
@@ -90,15 +99,80 @@ class Route:
         return before, *placed, _PlacedLeg(poses[-1], begins[-1], np.inf, 0.0)
 
     @cached_property
-    def _columns(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Return of all legs the starts (legs, 3), and (legs, 1) what precedes them, their lengths
-        and their curvatures.
-        """
+    def _columns(self) -> "_Legs":
         legs = self._legs
-        begins = np.array([[leg.begins] for leg in legs])
-        lengths = np.array([[leg.length] for leg in legs])
-        curvatures = np.array([[leg.curvature] for leg in legs])
-        return np.array([leg.start for leg in legs]), begins, lengths, curvatures
+        starts = np.array([leg.start for leg in legs])
+        places = np.array([(leg.begins, leg.length, leg.curvature) for leg in legs])
+        middles = [_after(leg.start, leg.length / 2, leg.curvature)[:2] for leg in legs[:-1]]
+        turns = np.column_stack([np.cos(-starts[:, 2]), np.sin(-starts[:, 2])])
+        return _Legs(starts, turns, places, np.array([*middles, (np.inf, np.inf)]))
+
+
+class _Legs(NamedTuple):
+    """All legs as rows: `starts` (legs, 3), `turns` (legs, 2) the cosine and sine that turn back by
+    their headings, `places` (legs, 3) what precedes them, their lengths and their curvatures, and
+    `middles` (legs, 2) in the world.
+    """
+
+    starts: Floats
+    turns: Floats
+    places: Floats
+    middles: Floats
+
+
+@compiled(brief=True)
+def _on_straights(points: Floats, legs: _Legs) -> tuple[Floats, Floats, Integers, Integers]:
+    """Return `Route.places` of points (n, 2) on the straight legs alone, after (n,) the squares of
+    the distances and before (n,) the legs. The last table (k, 2) holds points and bends that may be
+    as near.
+    """
+    squares, found = np.full(len(points), np.inf), np.empty((len(points), 3))
+    nearest = np.zeros(len(points), np.int64)
+    near = np.empty((len(points) * len(legs.starts), 2), np.int64)
+    count = 0
+    for n in range(len(points)):
+        for leg in range(len(legs.starts)):
+            begins, length, curvature = legs.places[leg]
+            if curvature != 0.0:
+                continue
+            left, up = points[n, 0] - legs.starts[leg, 0], points[n, 1] - legs.starts[leg, 1]
+            cos, sin = legs.turns[leg]
+            x, y = cos * left - sin * up, sin * left + cos * up
+            along = min(max(x, 0.0), length)
+            # Zero of either sign, which the sums keep.
+            turn = curvature * along
+            off_x, off_y = x - along, y - along * turn
+            square = off_x * off_x + off_y * off_y
+            if square < squares[n]:
+                squares[n], nearest[n] = square, leg
+                found[n] = begins + along, off_y - turn * off_x, legs.starts[leg, 2] + turn
+        for leg in range(len(legs.starts)):
+            # No point of a bend is farther from its middle than half of its length.
+            x, y = points[n, 0] - legs.middles[leg, 0], points[n, 1] - legs.middles[leg, 1]
+            reach = math.sqrt(squares[n]) + legs.places[leg, 1] / 2 + _SLACK_M
+            if legs.places[leg, 2] != 0.0 and x * x + y * y <= reach * reach:
+                near[count] = n, leg
+                count += 1
+    return squares, found, nearest, near[:count]
+
+
+@compiled(brief=True)
+def _take_nearer(
+    squares: Floats,
+    found: Floats,
+    nearest: Integers,
+    near: Integers,
+    bend_squares: Floats,
+    on_bends: Floats,
+) -> None:
+    """Take the places (k, 3) `on_bends` that are nearer than those `found`, as `_on_straights`
+    returns them. Among equally near legs the first counts.
+    """
+    for k in range(len(near)):
+        n, leg = near[k]
+        is_first = bend_squares[k] == squares[n] and leg < nearest[n]
+        if bend_squares[k] < squares[n] or is_first:
+            squares[n], nearest[n], found[n] = bend_squares[k], leg, on_bends[k]
 
 
 @dataclass(frozen=True)
@@ -135,8 +209,9 @@ def _chord(along: Floats | float, curvature: Floats | float) -> tuple[Floats, Fl
 def _after(start: Pose, along: float, curvature: float) -> Pose:
     # On a straight, by far the most frequent, the chord is the way itself.
     chord = _chord(along, curvature) if curvature else (along, 0.0)
-    x, y = turned(np.array(chord, float), start[2])
-    return start[0] + float(x), start[1] + float(y), start[2] + curvature * along
+    (x, y), cos, sin = chord, np.cos(start[2]), np.sin(start[2])
+    there = float(start[0] + (cos * x - sin * y)), float(start[1] + (sin * x + cos * y))
+    return *there, start[2] + curvature * along
 
 
 def through(points: Sequence[tuple[float, float]], radius_m: float) -> Route:
@@ -246,16 +321,16 @@ class SpeedPlan:
     def _speeds(self) -> Floats:
         bends = np.array([abs(self.route.curvature(s)) for s in self._places.tolist()])
         with np.errstate(divide="ignore"):
-            speeds = np.minimum(self.cruise_mps, np.sqrt(self.sideways_mps2 / bends))
+            speeds = np.minimum(self.cruise_mps, np.sqrt(self.sideways_mps2 / bends)).tolist()
         # v^2 grows by 2 a per metre: from each place on, and back from each.
         for here in range(1, len(speeds)):
             speeds[here] = min(speeds[here], self._reached(speeds[here - 1]))
         for here in range(len(speeds) - 2, -1, -1):
             speeds[here] = min(speeds[here], self._reached(speeds[here + 1]))
-        return speeds
+        return np.array(speeds)
 
     def _reached(self, speed: float) -> float:
-        return float(np.sqrt(speed**2 + 2 * self.comfort_mps2 * _SPACING_M))
+        return math.sqrt(speed**2 + 2 * self.comfort_mps2 * _SPACING_M)
 
 
 def _seconds_between(places: Floats, speeds: Floats) -> Floats:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 
 import numpy as np
 
@@ -27,6 +28,8 @@ WORLD_STEP_S = 0.05
 
 Motion = Callable[[float], Pose]
 """The pose of a body at a time in seconds."""
+Motions = Callable[[float], Floats]
+"""The poses (n, 3) of bodies at a time in seconds."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,19 @@ class Actor:
     def label(self) -> int | None:
         """Index into CLASSES, None when perception does not report it."""
         return CLASSES.index(self.kind.label) if self.reported and self.kind.label else None
+
+
+@dataclass(frozen=True)
+class Member:
+    """The motion of one body of many: `poses_at` returns (n, 3) the poses of all at a time."""
+
+    poses_at: Motions
+    number: int
+
+    def __call__(self, time: float) -> Pose:
+        """The pose at `time`."""
+        x, y, heading = self.poses_at(time)[self.number].tolist()
+        return x, y, heading
 
 
 @dataclass(frozen=True)
@@ -135,8 +151,9 @@ class World:
         self.meetings = []
         self.drawn = {}
         self._kinds = {self.ego_body: self.ego_kind}
-        self._moving: list[Actor] = []
-        self._moving_bodies = np.array([self.ego_body])
+        self._alone: list[Actor] = []
+        # Bodies and numbers of the members of each group.
+        self._groups: dict[Motions, tuple[list[int], list[int]]] = {}
         self._events: list[tuple[float, Callable[[], None]]] = []
         self._every_step: list[Callable[[World], None]] = []
         self._ego_motion = Ego(ego_speed)
@@ -171,10 +188,12 @@ class World:
         self._kinds[body] = kind
         actor = Actor(name, kind, body, pose_at, reported, pose)
         self.actors.append(actor)
-        if not isinstance(pose, tuple):
-            self._moving.append(actor)
-            bodies = [self.ego_body, *(one.body for one in self._moving)]
-            self._moving_bodies = np.array(bodies)
+        if isinstance(pose, Member):
+            bodies, numbers = self._groups.setdefault(pose.poses_at, ([], []))
+            bodies.append(body)
+            numbers.append(pose.number)
+        elif not isinstance(pose, tuple):
+            self._alone.append(actor)
         return actor
 
     def at(self, time: float, event: Callable[[], None]) -> None:
@@ -296,14 +315,17 @@ class World:
         )
 
         # Poses are read after events, which may change who moves.
-        bodies = self._moving_bodies
-        poses = [self.ego.pose, *(actor.pose_at(self.time) for actor in self._moving)]
-        table = np.array(poses, float)
-        self._before = self._footprints.boxes.copy()
-        self.bullet.move_all(bodies, table)
-        if not self._footprints.move_all(bodies, table):
-            for name, pose in zip(["the ego", *(a.name for a in self._moving)], poses, strict=True):
-                self._check_pose(name, pose)
+        poses = [self.ego.pose, *(actor.pose_at(self.time) for actor in self._alone)]
+        tables = [at(self.time)[numbers] for at, (_, numbers) in self._groups.items()]
+        self._put(np.concatenate([np.array(poses, float), *tables]), self._footprints.boxes)
+
+    def _put(self, poses: Floats, before: Floats) -> None:
+        bodies, self._before = np.array(self._moving), before.copy()
+        self.bullet.move_all(bodies, poses)
+        if not self._footprints.move_all(bodies, poses):
+            names = {self.ego_body: "the ego"} | {actor.body: actor.name for actor in self.actors}
+            for body, pose in zip(bodies.tolist(), poses.tolist(), strict=True):
+                self._check_pose(names[body], pose)
 
     def hand_over(self) -> None:
         """Let other code move the world by `put`, which calls no events."""
@@ -320,17 +342,20 @@ class World:
         self._steps = steps
         self.time = round(steps * WORLD_STEP_S, 9)
         self._ego_motion = motion
-        poses = np.ascontiguousarray(boxes[self._moving_bodies][:, [0, 1, 6]])
-        self._before = before.copy()
-        self.bullet.move_all(self._moving_bodies, poses)
-        self._footprints.move_all(self._moving_bodies, poses)
+        self._put(np.ascontiguousarray(boxes[self._moving][:, [0, 1, 6]]), before)
         vehicles = {self.ego_body: self.ego} | {
-            actor.body: source_of(actor.moved_by) for actor in self._moving
+            actor.body: source_of(actor.moved_by) for actor in self._alone
         }
         for body, (x, speed) in lanes.items():
             vehicle = vehicles[body]
             assert isinstance(vehicle, RoadVehicle)
             vehicle.put(float(x), float(speed))
+
+    @property
+    def _moving(self) -> list[int]:
+        """Bodies that may move: the ego, those that move alone, and members of groups."""
+        alone = [actor.body for actor in self._alone]
+        return [self.ego_body, *alone, *chain(*(bodies for bodies, _ in self._groups.values()))]
 
     def close(self) -> None:
         """Free the simulator."""

@@ -7,10 +7,14 @@ from care_sim.core.conditions import DriverSettings
 from care_sim.core.frames import Frame
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.core.types import Tracks
-from care_sim.loops.needless import NeedlessBraking, UnfoundedBraking
+from care_sim.driving.corridor import enters_strip
+from care_sim.loops.needless import NeedlessBraking, UnfoundedBraking, in_the_way
 from care_sim.world.route import Route
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World
+
+RULES = DriverSettings()
+STRIP = 1.1, 0.87 + 0.3, RULES.brake_horizon_s
 
 
 @pytest.fixture
@@ -23,12 +27,17 @@ def world():
 
 
 def judged(world, judge, braking=True):
+    return judge.judge(world.time, braking, len(entering(world)) > 0)
+
+
+def entering(world):
+    """The bodies in the way."""
     sensor = Frame.mounted(world.ego.pose, LIDAR_POSITION)
-    return judge.judge(world, sensor, braking)
+    return in_the_way(world, sensor, *STRIP)
 
 
 def fresh():
-    return NeedlessBraking(1.1, 0.87 + 0.3, DriverSettings())
+    return NeedlessBraking(RULES.brake_release_s)
 
 
 def test_an_empty_way_needs_no_brake(world):
@@ -84,8 +93,9 @@ def unfounded(world, box, in_view=False, behind=()):
         np.array([0]),
         np.array([3]),
     )
-    judge = UnfoundedBraking(1.1, 0.87 + 0.3, DriverSettings())
-    return judge.judge_tracks(world, sensor, track, track, True, in_view, np.array(behind))
+    boxes = sensor.boxes_to_world(track.boxes[enters_strip(track, *STRIP)])
+    judge = UnfoundedBraking(RULES.brake_release_s)
+    return judge.judge_tracks(world, boxes, entering(world), True, in_view, np.array(behind))
 
 
 def test_a_track_in_the_way_without_a_body_is_made_up(world):

@@ -59,7 +59,7 @@ def lane(places, **ego):
 def driven(street, seconds, ego_m, ego_speed=0.0):
     for step in range(1, round(seconds / STEP) + 1):
         street.step(STEP, step * STEP, ego_m, ego_speed)
-    return street.pose_at(0, 0, 0.0)[0]
+    return street.poses_at(0.0)[0, 0]
 
 
 def test_who_is_behind_a_standing_ego_stops():
@@ -75,7 +75,7 @@ def test_the_egos_place_in_a_lane_is_shifted():
 def test_poses_are_those_of_the_lane():
     street = StreetTraffic([lane([]), lane([3.0, 30.0])])
     street.step(STEP, STEP, 0.0, 0.0)
-    assert street.pose_at(1, 0, 0.0) == (pytest.approx(3.4), 0.0, 0.0)
+    assert street.poses_at(0.0)[0].tolist() == [pytest.approx(3.4), 0.0, 0.0]
 
 
 def crossing(from_m, to_m, went=True):
@@ -103,7 +103,7 @@ def test_drivers_stop_before_who_crosses_until_they_are_over(crossings, place):
     # Somebody who is over the lane holds nobody up.
     for step in range(401, 1201):
         street.step(STEP, step * STEP, 0.0, 0.0)
-    assert (street.pose_at(0, 0, 0.0)[0] > 50.0) is (place != -STANDING_GAP_M)
+    assert (street.poses_at(0.0)[0, 0] > 50.0) == (place != -STANDING_GAP_M)
 
 
 def test_who_has_passed_a_crossing_drives_on():

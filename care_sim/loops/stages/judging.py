@@ -11,7 +11,8 @@ from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.conditions import DriverSettings
 from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
-from care_sim.loops.needless import NeedlessBraking, UnfoundedBraking
+from care_sim.driving.corridor import enters_strip
+from care_sim.loops.needless import NeedlessBraking, UnfoundedBraking, in_the_way
 from care_sim.loops.records import Sight
 from care_sim.loops.stages.detecting import Detecting, Found
 from care_sim.loops.stages.driving import Ahead, Driving
@@ -25,7 +26,7 @@ class Judging:
     def __init__(self, rig: Rig, rules: DriverSettings, driving: Driving, worlds: int):
         self._rig = rig
         self._rules = rules
-        self._strip = driving.front_m, driving.guarded_m / 2
+        self._strip = driving.front_m, driving.guarded_m / 2, rules.brake_horizon_s
         self._needless: dict[int, NeedlessBraking] = {}
         self._unfounded: dict[int, UnfoundedBraking] = {}
         self._meeting: dict[int, Integers] = {}
@@ -36,10 +37,10 @@ class Judging:
             judges.pop(world, None)
         # Only the outcome of a drive holds it, and it reads the truth about every body.
         if built.speed_plan:
-            self._needless[world] = NeedlessBraking(*self._strip, self._rules)
+            self._needless[world] = NeedlessBraking(self._rules.brake_release_s)
         # The proxy reports bodies alone. Another detector may make one up.
         if not is_proxy:
-            self._unfounded[world] = UnfoundedBraking(*self._strip, self._rules)
+            self._unfounded[world] = UnfoundedBraking(self._rules.brake_release_s)
         if built.meetings:
             self._meeting[world] = np.array([one.body for one in built.meetings], np.int64)
 
@@ -62,14 +63,19 @@ class Judging:
         needless, unfounded = np.zeros((2, len(braking)), np.bool_)
         x, _, z = self._rig.sensor_position
         for world, there in built.items():
-            tracks, brakes = ahead[world], bool(braking[world])
-            middle = Frame.mounted(there.ego.pose, (x, 0.0, z))
+            (own, lying), brakes = ahead[world], bool(braking[world])
+            bodies, entering = np.empty(0, np.int64), np.empty((0, 7))
+            if brakes:
+                middle = Frame.mounted(there.ego.pose, (x, 0.0, z))
+                bodies = in_the_way(there, middle, *self._strip)
+                entering = middle.boxes_to_world(own.boxes[enters_strip(lying, *self._strip)])
             if world in self._needless:
-                needless[world] = self._needless[world].judge(there, middle, brakes)
+                needed = len(bodies) > 0
+                needless[world] = self._needless[world].judge(there.time, brakes, needed)
             if world in self._unfounded:
                 seen = bool(in_view[world]), found.behind(world)
                 unfounded[world] = self._unfounded[world].judge_tracks(
-                    there, middle, *tracks, brakes, *seen
+                    there, entering, bodies, brakes, *seen
                 )
         return needless, unfounded
 
