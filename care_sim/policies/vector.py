@@ -76,8 +76,8 @@ class VectorPolicy(ABC):
 def vector_policy(
     make: Callable[[], Policy], worlds: int, threads: Threads = ALONE
 ) -> VectorPolicy:
-    """Return the vector policy of this many worlds, each played as by a single policy of `make`. The
-    `threads` share the compiled work.
+    """Return the vector policy of this many worlds, each played as by a single policy of `make`.
+    The `threads` share the compiled work.
     """
     first = make()
     if isinstance(first, RowPolicy) and _asks_as(first, RowPolicy):

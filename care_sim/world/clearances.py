@@ -81,8 +81,8 @@ class Clearances:
         least: Floats = self._bounds[np.arange(len(steps))[:, None], recent].min(axis=1)
         asked = live & (least <= exact_below) & (least < np.inf)
         if asked.any():
-            judge, first = borrow_judge(), steps - count + 1
-            tables = _nearest(asked, first, count, self._poses, *self._boxes, self._counts)
+            judge, first, (own, other) = borrow_judge(), steps - count + 1, self._boxes
+            tables = _nearest(asked, first, count, self._poses, own, other, self._counts)
             gaps, pairs = (table.tolist() for table in tables)
             for world in np.flatnonzero(asked).tolist():
                 bodies, poses = self._stand_ins(judge, world), self._poses[world, first[world] :]

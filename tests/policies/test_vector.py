@@ -11,6 +11,7 @@ from gymnasium.vector import SyncVectorEnv
 
 import care_sim
 from care_sim.base.errors import InvalidInput
+from care_sim.base.threads import Threads
 from care_sim.certify.design import AS_LISTED
 from care_sim.core.cells.sets import CellSets, WorldSets
 from care_sim.core.cells.stack import GridStack
@@ -122,7 +123,7 @@ def test_ideas_by_rows_are_the_same_on_every_grid(name, order, grid, dense):
         }
         for observation in observations[:2]
     ]
-    together = vector_policy(lambda: BUILT_IN[name](rig), WORLDS)
+    together = vector_policy(lambda: BUILT_IN[name](rig), WORLDS, Threads(2))
     alone = BUILT_IN[name](rig)
     for observation in shown:
         actions = together(observation)

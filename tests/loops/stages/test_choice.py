@@ -1,9 +1,11 @@
 """All worlds together fire what each fires alone, with any hardware."""
 
 import numpy as np
+import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.firing.floor import Floor, floor_key
 from care_sim.core.grid import AngularGrid
@@ -75,3 +77,15 @@ def test_every_world_fires_as_if_alone(played, budgets, floor, floor_seed, firin
             alone[world] = last[world].tolist()
         assert rows(choice.fired(action, np.array(live), now)) == alone
         now += live
+
+
+@pytest.mark.parametrize("firing", ["cells", "rows"])
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf])
+def test_scores_that_are_not_finite_are_refused_where_a_world_plays(firing, wrong):
+    choice = Choice([Rig(GRID, budget=8, firing=firing)] * WORLDS, ClosedLoopConditions())
+    action = np.zeros((WORLDS, *GRID.shape), np.float32)
+    action[1, -1, -1] = wrong
+    now = np.zeros(WORLDS, np.int64)
+    with pytest.raises(InvalidInput, match="NaN or infinity"):
+        choice.fired(action, np.ones(WORLDS, bool), now)
+    assert choice.fired(action, np.array([True, False, True]), now).counts.tolist() == [8, 0, 8]
