@@ -22,7 +22,7 @@ from care_sim.perception.measured.detector import cell_angles, sweep_weights
 from care_sim.perception.measured.recall import FIRST_HIT, recall
 from care_sim.perception.measured.tables import MEASURED, measurement
 from care_sim.perception.proxy import CURVES, Curves, chance, read_curves
-from care_sim.sensors.annotated import Annotations, Cloud
+from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud
 
 _Rule = Callable[[str, Floats, Floats], Floats]
 """Maps a class, and returns (n,) now and on average per sweep, to chances (n,)."""
@@ -92,9 +92,11 @@ class Chances:
         """Return the number of returns (n,) on each object, in cells of the default grid."""
         order = np.argsort(annotations.objects)
         ascending = annotations.objects[order]
-        own = np.isin(cloud.objects, ascending)
+        places = np.searchsorted(ascending, cloud.objects)
+        # Returns of objects beyond the last one find a number that no return has.
+        own = np.append(ascending, NO_OBJECT - 1)[places] == cloud.objects
         heads = np.searchsorted(self._heads, cloud.cells[own], side="right") - 1
-        places = order[np.searchsorted(ascending, cloud.objects[own])]
+        places = order[places[own]]
         return np.asarray(np.bincount(places, self._angles[heads], len(annotations)), float)
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.cells.stack import Grid
@@ -287,8 +288,8 @@ class RecordedLidar:
 
     def ranges(self, cloud: Cloud) -> Floats:
         """(N,) the nearest return of every cell in metres, inf without one."""
-        nearest = np.full(self.grid.size, np.inf)
-        np.minimum.at(nearest, cloud.cells, self.grid.ranges_to(cloud.cells, cloud.points))
+        ranges = self.grid.ranges_to(cloud.cells, cloud.points)
+        nearest: Floats = _nearest(self.grid.size, cloud.cells, ranges)
         return nearest
 
     def _moved(
@@ -302,3 +303,12 @@ class RecordedLidar:
         ranges = self.grid.ranges_to(cloud.cells, cloud.points)
         moved = draw(ranges, cloud.cells, shots) / ranges
         return replace(cloud, points=self.grid.stretched(cloud.cells, cloud.points, moved))
+
+
+@compiled()
+def _nearest(size: int, cells: Cells, ranges: Floats) -> Floats:
+    """Return (N,) the least of the `ranges` (n,) of each of `size` cells, inf without one."""
+    nearest = np.full(size, np.inf)
+    for n in range(len(cells)):
+        nearest[cells[n]] = min(nearest[cells[n]], ranges[n])
+    return nearest

@@ -249,3 +249,11 @@ def test_wedges_have_the_margins_of_hulls():
 def test_directions_that_are_no_numbers_are_refused_in_one_line():
     with pytest.raises(InvalidInput, match=r"directions must be numbers, none of them NaN"):
         GRID.cells_of([[1.0, np.nan, 0.0]])
+
+
+def test_ranges_are_norms_to_the_last_bit():
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(10_000, 3)) * 10.0 ** rng.integers(-3, 3, (10_000, 1))
+    cells = np.zeros(len(points), np.int64)
+    found = AngularGrid().ranges_to(cells, points)
+    assert found.tobytes() == np.linalg.norm(points, axis=1).tobytes()

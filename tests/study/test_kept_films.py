@@ -45,12 +45,12 @@ def made(films, tmp_path, monkeypatch):
     return asked
 
 
-
 @pytest.mark.parametrize("sensor", ["nuscenes", "roof-and-corners"])
 def test_a_kept_film_is_the_one_that_was_made(made, sensor):
     source = Streets(sensor=sensor)
     first, again = (kept_film(source, FIRST, RAYS) for _ in range(2))
-    assert made == [FIRST.name] and first is not again
+    assert made == [FIRST.name]
+    assert first is not again
     for mine, kept in zip(first.shots, again.shots, strict=True):
         assert np.array_equal(mine.cloud.points, kept.cloud.points)
         assert np.array_equal(mine.cloud.objects, kept.cloud.objects)
@@ -98,7 +98,8 @@ class Own(Streets):
 def test_other_films_are_not_kept(made, source, scene, returns):
     for _ in range(2):
         kept_film(source, scene, returns)
-    assert len(made) == 2 and not cache_folder("films").exists()
+    assert len(made) == 2
+    assert not cache_folder("films").exists()
 
 
 def test_without_room_a_film_is_made_every_time(made, tmp_path):
