@@ -52,9 +52,9 @@ class Draws(NamedTuple):
 
 
 class Lasting(NamedTuple):
-    """Chance of W worlds at a keyframe: `luck` (W, n) and `edges` (W, n, 4) of n objects, as in
-    `Draws`; `beside` (W, n, ...) and `scene` (W, k, ...), as in `Chance`. `keys` (W, 2) are that of
-    false boxes and that of the episode, `keyframes` (W,) count from 1.
+    """Chance of W worlds at a keyframe. `luck` (W, n) and `edges` (W, n, 4) of n objects are as in
+    `Draws`, `beside` (W, n, ...) and `scene` (W, k, ...) as in `Chance`. `keys` (W, 2) are that of
+    false boxes and that of the episode. `keyframes` (W,) count from 1.
     """
 
     luck: Floats
