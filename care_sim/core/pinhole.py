@@ -405,18 +405,10 @@ def camera_models(cameras: Sequence[PinholeCamera]) -> CameraModels:
     )
 
 
-def mounts_of(cameras: Sequence[PinholeCamera]) -> Floats:
-    """(k, 4, 3) place and axes in the sensor frame of k cameras."""
-    models = camera_models(cameras)
-    return np.concatenate([models.positions[:, None], models.axes], axis=1)
-
-
 def mounted_cameras(worlds: int, cameras: Sequence[PinholeCamera]) -> MountedCameras:
     """The same cameras on so many cars."""
     models = camera_models(cameras)
-    return MountedCameras(
-        np.tile(mounts_of(cameras), (worlds, 1, 1, 1)),
-        models.focals,
-        models.centres,
-        np.array([(camera.width, camera.height) for camera in cameras]).reshape(-1, 2),
-    )
+    mounts = np.concatenate([models.positions[:, None], models.axes], axis=1)
+    sizes = np.array([(camera.width, camera.height) for camera in cameras]).reshape(-1, 2)
+    many = np.tile(mounts, (worlds, 1, 1, 1))
+    return MountedCameras(many, models.focals, models.centres, sizes)

@@ -13,7 +13,7 @@ from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats, Integers, Mask, filled
 from care_sim.core.cells.boxes import planar_ranges
 from care_sim.core.conditions import KITTI_CAMERA, YOLOX_CAMERA, CameraFaults, Sensing
-from care_sim.core.pinhole import PinholeCamera, mounted_cameras, mounts_of
+from care_sim.core.pinhole import PinholeCamera, mounted_cameras
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import NO_OBJECT, IdentifiedDetections
 from care_sim.sensors.camera_errors import ProfiledDetector
@@ -21,10 +21,11 @@ from care_sim.sensors.camera_faults import Delay, Detected, Misses
 from care_sim.sensors.camera_profiles import YOLOX
 from care_sim.sensors.false_boxes import EMPTY_POOL, NO_ROWS, BoxPool, FalseBoxes
 from care_sim.sensors.kitti.detector import KittiDetectors
-from care_sim.sensors.pictures import sort_by_confidence
+from care_sim.sensors.pictures import comes_before
 
 # Compiled code can only read module-level constants.
 _AGE, _CAMERA = ImageDetections.AGE, ImageDetections.CAMERA
+_CONFIDENCE = ImageDetections.CONFIDENCE
 
 
 class PictureTiming(NamedTuple):
@@ -64,15 +65,6 @@ def mounted(camera: PinholeCamera, faults: CameraFaults, rng: np.random.Generato
     return replace(
         camera, position=(x, y, z), yaw=camera.yaw + float(yaw), pitch=camera.pitch + float(pitch)
     )
-
-
-class Annotated(NamedTuple):
-    """What a source annotates of detections in W worlds, without columns where it does not:
-    `visible` (W, D) and `pictures` (W, k, 2) as in `care_sim.sensors.annotated`.
-    """
-
-    visible: Floats
-    pictures: Floats
 
 
 class CameraDetectors:
@@ -117,7 +109,6 @@ class CameraDetectors:
             else None
         )
         self._taken = Detected.of(worlds, 0)
-        self._unannotated = Annotated(np.empty((worlds, 0)), np.empty((worlds, 0, 2)))
 
     def begin(
         self, world: int, objects: Sequence[int], seed: np.random.SeedSequence, pool: BoxPool
@@ -142,7 +133,7 @@ class CameraDetectors:
             rng = np.random.default_rng(own[2])
             cameras = tuple(mounted(camera, sensing, rng) for camera in cameras)
             self.mounted[world] = cameras
-            self.cameras.mounts[world] = mounts_of(cameras)
+            self.cameras.mounts[world] = mounted_cameras(1, cameras).mounts[0]
         seeds = errors, jitter, confusion, ghosts
         if sensing.camera_profile == YOLOX_CAMERA:
             given = own_objects, cameras, self._keyframe_s, pool, seeds
@@ -157,15 +148,18 @@ class CameraDetectors:
         headings: Floats,
         boxes: Floats,
         times: Floats,
-        annotated: Annotated | None = None,
+        visible: Floats | None = None,
+        pictures: Floats | None = None,
     ) -> None:
         """Take the pictures of a keyframe in the worlds that are `live`. `seen` are their faultless
         detections, at `times` (W,) and with the cars' `headings` (W,). `boxes` (W, n, 7) are those
-        of all objects in the sensor frame, in their order, 0 for an absent object.
+        of all objects in the sensor frame, in their order, 0 for an absent object. A source may
+        annotate `visible` (W, D) and `pictures` (W, k, 2) as in `care_sim.sensors.annotated`.
         """
         # All faults draw at every keyframe, whatever is visible, so that every policy meets the
         # same faults.
-        visible, pictures = annotated or self._unannotated
+        visible = np.empty((len(live), 0)) if visible is None else visible
+        pictures = np.empty((len(live), 0, 2)) if pictures is None else pictures
         missed = np.zeros((len(live), 0), np.bool_)
         if self._misses.any:
             ranges = planar_ranges(boxes.reshape(-1, 7)).reshape(boxes.shape[:2])
@@ -235,44 +229,27 @@ def _sort_out(
     pictures: Floats,
     least: Floats,
 ) -> None:
-    """Leave of the detections `seen` in the worlds that are `live` the surest, sorted. Drop those
-    of `missed` (W, n) objects, and all where it is `dark` (W,). The last `false` (W,) ones, which
-    no miss concerns, get the age of their `pictures` (W, k, 2). `known` are how many objects a
-    world has (W,) and their numbers (W, n).
+    """Leave of the detections `seen` in the worlds that are `live` those of at least this
+    confidence, the surest first. Drop those of `missed` (W, n) objects, and all where it is `dark`
+    (W,). The last `false` (W,) ones, which no miss concerns, get the age of their `pictures`
+    (W, k, 2). `known` are how many objects a world has (W,) and their numbers (W, n).
     """
+    # Edges of `yolox` and of plain false boxes are whole on false boxes alone, which published
+    # episodes hold. The next version of the benchmark rounds all of them here.
     for w in range(len(live)):
         if not live[w]:
             continue
-        true = seen.counts[w] - false[w]
+        true, count = seen.counts[w] - false[w], 0
         for n in range(true, seen.counts[w] if pictures.shape[1] else 0):
             for k in range(2):
                 seen.rows[w, n, _AGE + k] = pictures[w, int(seen.rows[w, n, _CAMERA]), k]
         # In the dark nothing is reported, false boxes included; delays go on.
-        count = 0
         for n in range(0 if dark[w] else seen.counts[w]):
-            if n >= true or not _is_missed(seen.objects[w, n], w, missed, known):
-                _copy_row(seen, w, n, count)
+            is_sure = seen.rows[w, n, _CONFIDENCE] >= least[w]
+            if is_sure and (n >= true or not _is_missed(seen.objects[w, n], w, missed, known)):
+                _sort_in(seen, w, n, count, false[w] > 0)
                 count += 1
         seen.counts[w] = count
-        _sort(seen, w, least[w], false[w] > 0)
-
-
-@compiled(brief=True)
-def _sort(seen: Detected, world: int, least: float, by_all: bool) -> None:
-    """Sort the detections of a world; see `sort_by_confidence`."""
-    # Edges of `yolox` and of plain false boxes are whole on false boxes alone, which published
-    # episodes hold. The next version of the benchmark rounds all of them here.
-    # The leftmost of equally sure boxes comes first: nothing depends on the order of bodies, nor
-    # may it reveal which boxes are false.
-    count = seen.counts[world]
-    rows, objects = sort_by_confidence(
-        seen.rows[world, :count], seen.objects[world, :count], least, by_all
-    )
-    seen.counts[world] = len(rows)
-    for n in range(len(rows)):
-        seen.objects[world, n] = objects[n]
-        for k in range(rows.shape[1]):
-            seen.rows[world, n, k] = rows[n, k]
 
 
 @compiled(brief=True)
@@ -285,10 +262,20 @@ def _is_missed(body: int, world: int, missed: Mask, known: tuple[Integers, Integ
 
 
 @compiled(brief=True)
-def _copy_row(seen: Detected, world: int, n: int, to: int) -> None:
-    seen.objects[world, to] = seen.objects[world, n]
-    for k in range(seen.rows.shape[2]):
-        seen.rows[world, to, k] = seen.rows[world, n, k]
+def _sort_in(seen: Detected, world: int, n: int, place: int, has_false: bool) -> None:
+    """Put the detection n of a world among those before `place`, which are sorted."""
+    # The leftmost of equally sure boxes comes first: nothing depends on the order of bodies, nor
+    # may it reveal which boxes are false.
+    rows, objects = seen.rows[world], seen.objects[world]
+    row, body = rows[n].copy(), objects[n]
+    while place > 0 and comes_before(row, rows[place - 1], has_false):
+        objects[place] = objects[place - 1]
+        for k in range(len(row)):
+            rows[place, k] = rows[place - 1, k]
+        place -= 1
+    objects[place] = body
+    for k in range(len(row)):
+        rows[place, k] = row[k]
 
 
 _HERE = np.ones(1, np.bool_)
@@ -316,8 +303,6 @@ class CameraDetector:
         `CameraDetectors.take` and `CameraDetectors.newest`.
         """
         here, rows = Detected.of(1, len(seen)).put(0, seen), np.array([heading], float)
-        visible = np.empty(0) if seen.visible is None else seen.visible
-        pictures = np.empty((0, 2)) if seen.pictures is None else seen.pictures
-        annotated = Annotated(visible[None], pictures[None])
-        self._all.take(_HERE, here, rows, boxes[None], np.array([time_s], float), annotated)
+        told = (None if one is None else one[None] for one in (seen.visible, seen.pictures))
+        self._all.take(_HERE, here, rows, boxes[None], np.array([time_s], float), *told)
         return self._all.newest(_HERE, rows).take(0)

@@ -101,35 +101,10 @@ def reported_boxes(table: Integers, classes: Integers, camera: int) -> tuple[Flo
 
 
 @compiled()
-def sort_by_confidence(
-    rows: Floats, objects: Integers, least: float, by_all: bool
-) -> tuple[Floats, Integers]:
-    """The detections of at least this confidence, the surest first, of equally sure ones the
-    leftmost, and the `objects` (n,) behind them. Of equals the earlier comes first, or `by_all`
-    their numbers decide, from the last column on.
+def comes_before(one: Floats, other: Floats, by_all: bool) -> bool:
+    """Whether a detection (9,) is surer than another one, or of equally sure ones more to the left.
+    `by_all`, their numbers decide about equals, from the last column on.
     """
-    order = np.empty(len(rows), np.int64)
-    count = 0
-    for n in range(len(rows)):
-        if not rows[n, _CONFIDENCE] >= least:
-            continue
-        place = count
-        while place > 0 and _comes_before(rows[n], rows[order[place - 1]], by_all):
-            order[place] = order[place - 1]
-            place -= 1
-        order[place] = n
-        count += 1
-    sorted_rows = np.empty((count, rows.shape[1]))
-    behind = np.empty(count, np.int64)
-    for place in range(count):
-        behind[place] = objects[order[place]]
-        for k in range(rows.shape[1]):
-            sorted_rows[place, k] = rows[order[place], k]
-    return sorted_rows, behind
-
-
-@compiled()
-def _comes_before(one: Floats, other: Floats, by_all: bool) -> bool:
     if one[_CONFIDENCE] != other[_CONFIDENCE]:
         return bool(one[_CONFIDENCE] > other[_CONFIDENCE])
     if one[_LEFT] != other[_LEFT]:

@@ -8,19 +8,11 @@ import numpy as np
 import pytest
 from scipy.sparse.csgraph import connected_components
 
-from care_sim.core.pinhole import mounted_cameras
 from care_sim.core.types import CLASSES
 from care_sim.sensors.kitti.beside import PAIRS
 from care_sim.sensors.kitti.detector import Draws, report
 from care_sim.sensors.kitti.invented import MOST, Chance
-from care_sim.sensors.kitti.labels import (
-    KINDS,
-    Labels,
-    covered,
-    labels_in,
-    lay_labels,
-    room_for_labels,
-)
+from care_sim.sensors.kitti.labels import KINDS, Labels, covered
 
 FOLDER = Path(__file__).parents[3] / "shared" / "data" / "kitti-object"
 needs_kitti = pytest.mark.skipif(not FOLDER.is_dir(), reason=f"no {FOLDER}")
@@ -89,20 +81,6 @@ def halves(seed=None):
         half[group] = totals.argmin()
         totals[half[group]] += sizes[group]
     return half[groups]
-
-
-def labels_of(seen, boxes, places, cameras):
-    """The labels of faultless detections `seen` (n,) in the pictures of `cameras`. `boxes` (m, 7)
-    are 3D boxes in the sensor frame, `places` (n,) those of the objects that are seen.
-    """
-    labels, counts = room_for_labels(1, len(seen)), np.array([len(seen)])
-    visible = np.empty((1, 0)) if seen.visible is None else seen.visible[None]
-    rows = seen.detections.rows()[None].copy()
-    mounted = mounted_cameras(1, cameras)
-    lay_labels(
-        np.ones(1, np.bool_), counts, rows, places[None], visible, boxes[None], mounted, labels
-    )
-    return labels_in(labels, 0, len(seen))
 
 
 def as_labels(told: Pictures) -> tuple[Labels, np.ndarray]:

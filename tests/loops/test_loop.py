@@ -64,3 +64,27 @@ def test_perception_reports_no_body_that_an_event_adds(cars):
         seen = loop.arrived.objects[0, : loop.arrived.counts[0]]
         assert len(loop.world(0).kinds) == known + 8
         assert (seen <= known).all()
+
+
+@pytest.mark.parametrize("asks", ["target", "all"])
+def test_cameras_show_the_same_bodies_whenever_pictures_are_taken(asks):
+    """Late pictures leave the keyframe's to be drawn for bodies that somebody asks about."""
+    conditions = [ClosedLoopConditions(), ClosedLoopConditions(camera_latency_s=0.12)]
+    loop = Loop([Rig(cameras=(FRONT_CAMERA,))] * 2, conditions, 2.0)
+    worlds = [episode(0) for _ in range(2)]
+    for begun in worlds:
+        for n in range(8):
+            begun.world.add(f"car {n}", "car", (12.0 + 6 * n, 1.5 * n - 4.0, 0.0))
+        begun.world.first_sighting = begun.world.actors[-8]
+    loop.begin(dict(enumerate(worlds)))
+    target, seen = worlds[0].world.first_sighting.body, []
+    bodies = range(len(worlds[0].world.kinds)) if asks == "all" else [target]
+    for _ in range(18):
+        shown = np.array([[loop.shows(world, body) for body in bodies] for world in range(2)])
+        assert shown[0].tolist() == shown[1].tolist()
+        in_view = loop.keyframe(Fired.of([np.empty(0, np.int64)] * 2), np.ones(2, np.bool_)).in_view
+        assert in_view[0] == in_view[1] == shown[0, bodies.index(target)]
+        seen += shown[0].tolist()
+    assert {*seen} == {True, False}
+    for begun in worlds:
+        begun.world.close()

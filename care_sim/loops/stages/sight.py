@@ -105,8 +105,9 @@ class Seeing:
         self._asks_few[world] = self.after_steps[world] > 0 and labels.keys() >= {*asked}
 
     def look(self, state: State) -> tuple[Detected, Mask]:
-        """Take the pictures of a keyframe: the newest detections that are due, and (W, B) which
-        bodies a camera shows enough of for a box, known of those alone that somebody asks about.
+        """Take the pictures of a keyframe. Return the newest detections that are due, and (W, B)
+        which bodies a camera shows enough of for a box. Only those that somebody asks about are
+        sure to be known.
         """
         live = state.live
         _see_boxes(live, state.sensors, state.bodies, state.reported)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
 from care_sim.base.threads import Threads
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Integers, Mask, longer
 from care_sim.core.pinhole import MountedCameras, PinholeCamera
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import NO_OBJECT
@@ -30,13 +30,7 @@ from care_sim.sensors.kitti.errors import (
     surest_of,
 )
 from care_sim.sensors.kitti.invented import MOST, Boxes, Chance, Picture
-from care_sim.sensors.kitti.labels import (
-    Labels,
-    labels_in,
-    lay_labels,
-    pictures_of,
-    room_for_labels,
-)
+from care_sim.sensors.kitti.labels import Labels, labels_of, pictures_of
 from care_sim.sensors.kitti.numbers import FOCAL_PX, Numbers, measured
 from care_sim.sensors.kitti.recall import features, score_logits, score_of
 
@@ -58,9 +52,9 @@ class Draws(NamedTuple):
 
 
 class Lasting(NamedTuple):
-    """Chance of W worlds at a keyframe: `luck` (W, n) and `edges` (W, n, 4) of n objects, as in
-    `Draws`; `beside` (W, n, ...) and `scene` (W, k, ...), as in `Chance`. `keys` (W, 2) are that of
-    false boxes and that of the episode, `keyframes` (W,) count from 1.
+    """Chance of W worlds at a keyframe. `luck` (W, n) and `edges` (W, n, 4) of n objects are as in
+    `Draws`, `beside` (W, n, ...) and `scene` (W, k, ...) as in `Chance`. `keys` (W, 2) are that of
+    false boxes and that of the episode. `keyframes` (W,) count from 1.
     """
 
     luck: Floats
@@ -121,11 +115,11 @@ class KittiDetectors:
         visible: Floats,
         cameras: MountedCameras,
     ) -> Detected:
-        """Return the reports on the detections `seen` in the worlds that are `live`, and `seen` of
-        the others. The last `false` (W,) detections of a world, counted anew, are false: before,
-        those that get scores and errors like the others. `objects` are how many a world has (W,),
-        their numbers (W, n), and 3D boxes (W, n, 7) in the sensor frames. `visible` is as in
-        `lay_labels`, `cameras` are as mounted. Errors change per keyframe, whatever the time.
+        """Return `seen` with the reports on these detections in the worlds that are `live`. The
+        last `false` (W,) detections of a world, counted anew, are false: before, those that get
+        scores and errors like the others. `objects` are how many a world has (W,),
+        their numbers (W, n), and 3D boxes (W, n, 7) in the sensor frames. `visible` (W, D) is as in
+        `labels_of`, `cameras` are as mounted. Errors change per keyframe, whatever the time.
         """
         # Everything is drawn at every keyframe, whatever is there.
         self._keyframes += live
@@ -137,109 +131,85 @@ class KittiDetectors:
             self._keys,
             self._keyframes,
         )
-        counts, numbers, boxes = objects
         most = int(seen.counts.max())
-        labels = room_for_labels(len(live), most)
-        true = seen.counts - false
-        places = np.zeros((len(live), most), np.int64)
-        lay_places(live, true, seen.objects, counts, numbers, places)
-        there = true, seen.rows, places, visible, boxes, cameras
-        self._threads.share(lay_labels, live, *there, labels)
         room = most * (1 + PAIRS * MOST) + self._cameras * len(self._numbers.pairs) * MOST
-        into = Detected.of(len(live), room)
-        _copy_detected(~live, seen, into)
-        given = labels, seen, lasting, counts, self._pictures, cameras.focals, self._numbers
-        self._threads.share(_report, live, *given, false, into)
-        return into
+        if room > seen.rows.shape[1]:
+            seen = Detected(seen.counts, longer(seen.rows, room), longer(seen.objects, room))
+        given = objects, visible, cameras, self._pictures, lasting, self._numbers
+        self._threads.share(_report, live, seen, false, *given)
+        return seen
 
 
-@compiled(brief=True)
-def lay_places(
-    live: Mask,
-    counts: Integers,
-    objects: Integers,
-    known: Integers,
-    numbers: Integers,
-    places: Integers,
-) -> None:
-    """Fill `places` (W, D) of the first `counts` (W,) of `objects` (W, D) among the first `known`
-    (W,) `numbers` (W, n).
-    """
-    for w in range(len(live)):
-        for n in range(counts[w] if live[w] else 0):
-            for place in range(known[w]):
-                if numbers[w, place] == objects[w, n]:
-                    places[w, n] = place
-
-
-@compiled(brief=True)
-def _copy_detected(live: Mask, seen: Detected, into: Detected) -> None:
-    """Copy the detections of the worlds that are `live`."""
-    for w in range(len(live)):
-        if live[w]:
-            into.counts[w] = seen.counts[w]
-            for n in range(seen.counts[w]):
-                into.objects[w, n] = seen.objects[w, n]
-                for k in range(seen.rows.shape[2]):
-                    into.rows[w, n, k] = seen.rows[w, n, k]
+@compiled()
+def _place_of(body: int, objects: Integers) -> int:
+    """The place of an object among others, 0 of any other."""
+    for place in range(len(objects)):
+        if objects[place] == body:
+            return place
+    return 0
 
 
 @compiled()
 def _report(
     live: Mask,
-    labels: Labels,
     seen: Detected,
-    lasting: Lasting,
-    objects: Integers,
-    pictures: Floats,
-    focals: Floats,
-    numbers: Numbers,
     false: Integers,
-    into: Detected,
+    objects: tuple[Integers, Integers, Floats],
+    visible: Floats,
+    cameras: MountedCameras,
+    pictures: Floats,
+    lasting: Lasting,
+    numbers: Numbers,
 ) -> None:
     """See `KittiDetectors.detect`."""
     for w in range(len(live)):
         if not live[w]:
             continue
-        count, true = objects[w], seen.counts[w] - false[w]
+        count, known = seen.counts[w] - false[w], objects[0][w]
+        rows, bodies = seen.rows[w, :count].copy(), seen.objects[w, :count].copy()
+        places = np.empty(count, np.int64)
+        for n in range(count):
+            places[n] = _place_of(bodies[n], objects[1][w, :known])
+        labels = labels_of(rows, places, visible[w], objects[2][w], cameras, w)
+        lent = _lent(seen.rows[w, count : seen.counts[w]], cameras.focals)
         now = key_of(lasting.keys[w, 1], lasting.keyframes[w], 0, 0)
-        chance = Chance(lasting.keys[w, 0], now, lasting.beside[w, :count], lasting.scene[w])
-        draws = Draws(lasting.luck[w, :count], lasting.edges[w, :count], now, chance)
-        lent = _lent(seen.rows[w, true : seen.counts[w]], focals)
-        found, shown_in = report(labels_in(labels, w, true), pictures[w], lent, draws, numbers)
+        chance = Chance(lasting.keys[w, 0], now, lasting.beside[w, :known], lasting.scene[w])
+        draws = Draws(lasting.luck[w, :known], lasting.edges[w, :known], now, chance)
+        found, shown_in = report(labels, pictures[w], lent, draws, numbers)
 
-        # Objects first.
-        reported = 0
-        for is_false in (False, True):
-            for n in range(len(shown_in)):
-                if is_false == (found.sources[n] < 0):
-                    _enter(seen, w, found, n, shown_in[n], focals, into, reported)
-                    reported += 1
-            if not is_false:
-                false[w] = len(shown_in) - reported
-        into.counts[w] = reported
+        false[w] = _enter(seen, w, (rows, bodies), found, shown_in, cameras.focals)
 
 
 @compiled()
 def _enter(
     seen: Detected,
     world: int,
+    given: tuple[Floats, Integers],
     found: Boxes,
-    n: int,
-    camera: int,
+    shown_in: Integers,
     focals: Floats,
-    into: Detected,
-    at: int,
-) -> None:
-    """Enter the box n of a world's reports in row `at` of the detections."""
-    source, row = found.sources[n], into.rows[world, at]
-    for k in range(len(row)):
-        row[k] = seen.rows[world, source, k] if source >= 0 else 0.0
-    row[_CLASS], row[_CONFIDENCE], row[_CAMERA] = found.classes[n], found.scores[n], camera
-    # One pixel of KITTI is the unit of all edges.
-    for j in range(EDGES):
-        row[_LEFT + j] = np.trunc(found.edges[n, j]) / (FOCAL_PX / focals[camera])
-    into.objects[world, at] = seen.objects[world, source] if source >= 0 else NO_OBJECT
+) -> int:
+    """Write the reports, those on objects first, over the detections of a world, which were
+    `given`. Return how many are false.
+    """
+    count = 0
+    for is_false in (False, True):
+        true = count
+        for n in range(len(shown_in)):
+            source, camera = found.sources[n], shown_in[n]
+            if is_false != (source < 0):
+                continue
+            row = seen.rows[world, count]
+            for k in range(len(row)):
+                row[k] = 0.0 if is_false else given[0][source, k]
+            row[_CLASS], row[_CONFIDENCE], row[_CAMERA] = found.classes[n], found.scores[n], camera
+            # One pixel of KITTI is the unit of all edges.
+            for j in range(EDGES):
+                row[_LEFT + j] = np.trunc(found.edges[n, j]) / (FOCAL_PX / focals[camera])
+            seen.objects[world, count] = NO_OBJECT if is_false else given[1][source]
+            count += 1
+    seen.counts[world] = count
+    return count - true
 
 
 @compiled()

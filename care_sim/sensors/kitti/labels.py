@@ -85,64 +85,42 @@ def pictures_of(cameras: Sequence[PinholeCamera], focal_px: float) -> Floats:
     return np.column_stack([pixels, heights / KITTI_CAMERA_M])
 
 
-def room_for_labels(worlds: int, most: int) -> Labels:
-    """Tables (W, most, ...) of labels of so many worlds."""
-    room = worlds, most
-    whole = tuple(np.empty(room, np.int64) for _ in range(5))
-    classes, kinds, levels, cameras, places = whole
-    beyond, metres, cover = (np.empty(room) for _ in range(3))
-    boxes, cut = np.empty((*room, 4)), np.empty((*room, 4), np.bool_)
-    return Labels(classes, kinds, boxes, cut, levels, beyond, metres, cover, cameras, places)
-
-
 @compiled()
-def labels_in(labels: Labels, world: int, count: int) -> Labels:
-    """The labels of a world."""
-    return Labels(
-        labels.classes[world, :count],
-        labels.kinds[world, :count],
-        labels.boxes[world, :count],
-        labels.cut[world, :count],
-        labels.levels[world, :count],
-        labels.beyond[world, :count],
-        labels.metres[world, :count],
-        labels.cover[world, :count],
-        labels.cameras[world, :count],
-        labels.places[world, :count],
-    )
-
-
-@compiled()
-def lay_labels(
-    live: Mask,
-    counts: Integers,
+def labels_of(
     rows: Floats,
     places: Integers,
     visible: Floats,
     boxes: Floats,
     cameras: MountedCameras,
-    labels: Labels,
-) -> None:
-    """Fill `labels` (W, D, ...) with the objects of faultless detections, of the worlds that are
-    `live`: the first `counts` (W,) of `rows` (W, D, 9), with their `places` (W, D) among the 3D
-    `boxes` (W, n, 7) in the sensor frames. `visible` (W, D) are annotated shares; without columns
+    world: int,
+) -> Labels:
+    """The objects of faultless detections `rows` (n, 9) in a world, at `places` (n,) among the 3D
+    `boxes` (m, 7) in the sensor frame. `visible` are their annotated shares (n,), or empty: then
     they are read off the boxes.
     """
-    for w in range(len(live)):
-        if not live[w]:
-            continue
-        own = labels_in(labels, w, counts[w])
-        depths = np.empty(counts[w])
-        for n in range(counts[w]):
-            share = visible[w, n] if visible.shape[1] else math.nan
-            box = boxes[w, places[w, n] : places[w, n] + 1]
-            number = int(rows[w, n, _CAMERA])
-            own.cameras[n], own.places[n] = number, places[w, n]
-            camera = mounted_model(cameras, w, number)
-            depths[n] = _lay_label(n, rows[w, n], share, box, camera, cameras.sizes[number], own)
-        hidden = covered(own.boxes, depths, own.cameras)
-        for n in range(counts[w]):
-            own.cover[n] = hidden[n]
+    count = len(rows)
+    whole, shares, edges = np.empty((4, count), np.int64), np.empty((3, count)), (count, 4)
+    labels = Labels(
+        whole[0],
+        whole[1],
+        np.empty(edges),
+        np.empty(edges, np.bool_),
+        whole[2],
+        shares[0],
+        shares[1],
+        shares[2],
+        whole[3],
+        places,
+    )
+    depths = np.empty(count)
+    for n in range(count):
+        number = int(rows[n, _CAMERA])
+        labels.cameras[n] = number
+        share = visible[n] if len(visible) else math.nan
+        seen = mounted_model(cameras, world, number), cameras.sizes[number]
+        depths[n] = _lay_label(n, rows[n], share, boxes[places[n] : places[n] + 1], seen, labels)
+    labels.cover[:] = covered(labels.boxes, depths, labels.cameras)
+    return labels
 
 
 @compiled()
@@ -151,13 +129,13 @@ def _lay_label(
     row: Floats,
     visible: float,
     box: Floats,
-    camera: CameraModel,
-    size: Integers,
+    seen_by: tuple[CameraModel, Integers],
     labels: Labels,
 ) -> float:
     """Fill the label n of an object with a 3D box (1, 7), but for its cover; return its depth. A
-    `visible` share of NaN is read off the boxes.
+    `visible` share of NaN is read off the boxes. A camera of a width and height sees it.
     """
+    camera, size = seen_by
     label = int(row[_CLASS])
     kind, unhidden = KINDS[label], UNHIDDEN_SHARES[label]
     labels.classes[n], labels.kinds[n] = label, kind

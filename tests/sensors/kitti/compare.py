@@ -17,8 +17,8 @@ from matplotlib.figure import Figure
 
 from care_sim.core.types import CLASSES
 from care_sim.reports.figures.styles import BLUE, GREEN, INK, ORANGE, default_style, save
-from care_sim.sensors.kitti import recall
-from care_sim.sensors.kitti.labels import labels_in, lay_labels
+from care_sim.sensors.kitti import detector, recall
+from care_sim.sensors.kitti.labels import labels_of
 from care_sim.sensors.kitti.numbers import FOCAL_PX, measured
 from tests.helpers.kitti_object import as_labels, halves, kitti_pictures, matched, simulated
 from tests.helpers.telling_false_boxes import (
@@ -110,8 +110,9 @@ def street_areas():
     heights = partial(_uneven, spread=CAR_HEIGHTS, shifts=(0.0, 0.0))
     roads = partial(_uneven, spread=CAR_HEIGHTS, shifts=(PICTURE_PX, OBJECT_PX))
     found = {}
-    for name, labels in (("as shown", lay_labels), ("heights", heights), ("roads too", roads)):
-        with patch("care_sim.sensors.kitti.detector.lay_labels", labels):
+    for name, labels in (("as shown", labels_of), ("heights", heights), ("roads too", roads)):
+        python = patch.object(detector, "_report", detector._report.py_func)
+        with python, patch.object(detector, "labels_of", labels):
             rows, false, streets = boxes_of_streets(STREETS, EPISODES)
         found[name] = [
             area_under_the_curve(rows, false, streets % 2, out) for out in ((), ALL_BUT_FOOT)
@@ -119,22 +120,21 @@ def street_areas():
     return found
 
 
-def _uneven(live, counts, rows, places, visible, boxes, cameras, labels, spread, shifts):
-    """Lay the labels of cars of uneven heights (`spread`) on roads that lie higher or lower, by
-    picture and by object (`shifts`, pixels), in one world.
+def _uneven(rows, places, visible, boxes, cameras, world, spread, shifts):
+    """Labels of cars of uneven heights (`spread`) on roads that lie higher or lower, by picture and
+    by object (`shifts`, pixels).
     """
-    lay_labels(live, counts, rows, places, visible, boxes, cameras, labels)
-    own = labels_in(labels, 0, counts[0])
-    places = own.places
+    labels = labels_of(rows, places, visible, boxes, cameras, world)
     heights = np.random.default_rng(0).normal(0, spread, places.max(initial=0) + 1)[places]
-    rng = np.random.default_rng(zlib.crc32(own.boxes.tobytes()))
-    moved = rng.normal(0, shifts[0], len(cameras.focals))[own.cameras]
+    rng = np.random.default_rng(zlib.crc32(labels.boxes.tobytes()))
+    moved = rng.normal(0, shifts[0], len(cameras.focals))[labels.cameras]
     moved += rng.normal(0, shifts[1], len(places))
-    edges, is_car = own.boxes, own.classes < CLASSES.index("bicycle")
+    edges, is_car = labels.boxes.copy(), labels.classes < CLASSES.index("bicycle")
     edges[:, 1] -= np.where(is_car, heights, 0.0) * (edges[:, 3] - edges[:, 1])
-    lowest = (cameras.sizes[:, 1] * FOCAL_PX / cameras.focals)[own.cameras]
+    lowest = (cameras.sizes[:, 1] * FOCAL_PX / cameras.focals)[labels.cameras]
     edges[:, 1] = np.clip(edges[:, 1] + moved, 0, lowest - 2)
-    edges[:, 3] = np.where(own.cut[:, 3], lowest, np.clip(edges[:, 3] + moved, 1, lowest))
+    edges[:, 3] = np.where(labels.cut[:, 3], lowest, np.clip(edges[:, 3] + moved, 1, lowest))
+    return labels._replace(boxes=edges)
 
 
 @default_style()

@@ -9,6 +9,7 @@ from scipy.stats import norm, rankdata
 
 import care_sim
 from care_sim.core.conditions import Sensing
+from care_sim.core.pinhole import mounted_cameras
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.sensors.annotated import NO_OBJECT, IdentifiedDetections
 from care_sim.sensors.camera import CameraDetector
@@ -16,10 +17,10 @@ from care_sim.sensors.camera_errors import UNHIDDEN, whole_boxes
 from care_sim.sensors.false_boxes import BoxPool
 from care_sim.sensors.kitti import recall
 from care_sim.sensors.kitti.background import usual_low
-from care_sim.sensors.kitti.labels import pictures_of
+from care_sim.sensors.kitti.labels import labels_of, pictures_of
 from care_sim.sensors.kitti.numbers import measured
 from care_sim.sensors.pictures import FRONT_CAMERA
-from tests.helpers.kitti_object import labels_of, overlaps
+from tests.helpers.kitti_object import overlaps
 
 FOCAL_PX = 721.5
 SCALE = FOCAL_PX / FRONT_CAMERA.focal
@@ -43,6 +44,12 @@ def seen_of(labels, boxes, shares=1.0, camera=FRONT_CAMERA, visible=None):
     rows[:, ImageDetections.CLASS], rows[:, ImageDetections.CONFIDENCE] = labels, 0.9
     rows[:, ImageDetections.BOX] = edges
     return IdentifiedDetections(ImageDetections.from_rows(rows), np.arange(len(rows)), visible)
+
+
+def labels_in(seen, boxes):
+    rows, places = seen.detections.rows().copy(), np.arange(len(seen))
+    visible = np.empty(0) if seen.visible is None else seen.visible
+    return labels_of(rows, places, visible, boxes, mounted_cameras(1, [FRONT_CAMERA]), 0)
 
 
 def camera_of(objects, seed=0, keyframe_s=0.1, cameras=(FRONT_CAMERA,)):
@@ -95,7 +102,7 @@ def test_lengths_are_told_in_kittis_pixels_and_levels():
         [box(PEDESTRIAN, 15.0), box(CAR, 4.0, 3.5), box(CAR, 20.0, -4.0), box(CAR, 26.0, -5.2)]
     )
     seen = seen_of([PEDESTRIAN, CAR, CAR, CAR], boxes, visible=np.array([0.84, 0.79, 0.46, 0.44]))
-    told = labels_of(seen, boxes, np.arange(4), [FRONT_CAMERA])
+    told = labels_in(seen, boxes)
     spans = FRONT_CAMERA.project_boxes(boxes) * SCALE
     height = 1.75 / (15.0 - 0.25 - 0.76) * FOCAL_PX
     assert told.boxes[0, 3] - told.boxes[0, 1] == pytest.approx(height, rel=0.02)
@@ -227,7 +234,7 @@ def test_a_lower_camera_sees_objects_end_less_far_below_the_horizon():
     (picture,) = pictures_of([FRONT_CAMERA], FOCAL_PX)
     assert picture[4] == pytest.approx((1.84 - 0.33) / 1.65)
     boxes = np.array([box(CAR, 20.0)])
-    labels = labels_of(seen_of([CAR], boxes), boxes, np.arange(1), [FRONT_CAMERA])
+    labels = labels_in(seen_of([CAR], boxes), boxes)
     usual = measured().numbers.usual_lows[0]
     none = usual_low(labels, np.empty(0, np.int64), 0, picture, usual)
     assert none == pytest.approx(1.134 * 1.51 / 1.65, abs=0.01)
