@@ -200,11 +200,12 @@ class Loop:
         if not self._reads_worlds:
             return
         due = [world for world, after in self.sight.between.items() if after == steps]
-        for world in due:
-            if self.state.live[world]:
-                self.world(world)
-                self.locating.place(self.state, world)
-                self.sight.look_between(self.state, world)
+        who = np.zeros(self.state.worlds, np.bool_)
+        who[due] = self.state.live[due]
+        self.locating.place(self.state, who)
+        for world in np.flatnonzero(who).tolist():
+            self.world(world)
+            self.sight.look_between(self.state, world)
 
     def _look(self, who: Mask) -> None:
         """Take the cameras' pictures and write the observations of the worlds `who`."""

@@ -5,7 +5,6 @@ import numpy as np
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.conditions import Sensing
-from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego
 from care_sim.driving.localisation import Localisation, Odometry
@@ -58,14 +57,13 @@ class Locating:
                 moving[world, 0] = odometer.reading(Ego(*moving[world].tolist())).speed
         np.clip(moving, *self._limits, out=state.read, where=state.live[:, None])
 
-    def place(self, state: State, world: int) -> None:
-        """Put the sensor of a world where it is now, between two keyframes."""
-        x, y, yaw = state.bodies.boxes[world, state.egos.bodies[world], [0, 1, 6]].tolist()
-        sensor = Frame.mounted((x, y, yaw), self._at)
-        state.sensors.put(world, sensor)
-        localisation = self._localisations[world]
-        if localisation is not None:
-            state.taken.put(world, localisation.taken_for(sensor))
+    def place(self, state: State, who: Mask) -> None:
+        """Put the sensors of the worlds `who` where they are now, between two keyframes."""
+        place_sensors(state.sensors, state.bodies.boxes, state.egos.bodies, who, self._at)
+        for world in np.flatnonzero(who).tolist() if self._errs else ():
+            localisation = self._localisations[world]
+            assert localisation is not None
+            state.taken.put(world, localisation.taken_for(state.sensors.frame(world)))
 
     def _err(self, state: State) -> None:
         """Put the sensors where the software takes them to be."""
