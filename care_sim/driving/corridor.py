@@ -28,7 +28,9 @@ def along_route(tracks: Tracks, route: Route, sensor: Frame) -> Tracks:
     if not len(tracks):
         return tracks
     boxes = sensor.boxes_to_world(tracks.boxes)
-    found = route.places(np.vstack([[sensor.x, sensor.y], boxes[:, :2]]))
+    points = np.empty((1 + len(boxes), 2))
+    points[0], points[1:] = (sensor.x, sensor.y), boxes[:, :2]
+    found = route.places(points)
     headings = found[1:, 2]
     rows = tracks.rows().copy()
     straight = rows[:, Tracks.BOX]

@@ -72,7 +72,8 @@ class UnfoundedBraking(NeedlessBraking):
         first-sighting actor.
         """
         target = world.first_sighting
-        self._has_met |= in_view or (target is not None and target.body in behind)
+        if not self._has_met:
+            self._has_met = in_view or (target is not None and target.body in behind)
         unseen = NO_BODY if self._has_met or target is None else target.body
         needed = braking and bool((bodies != unseen).any() or _touch(entering, world, unseen))
         return self.judge(world.time, braking, needed)

@@ -106,11 +106,11 @@ def _flowing(drive: Drive, lane: DrivenLane) -> FlowingLane:
 
 def _add_bodies(world: World, drive: Drive) -> None:
     """Add everything that stands or walks on its own."""
-    walking = _Ways(drive.ways)
-    for number, (kind, way) in enumerate(zip(drive.kinds, drive.ways, strict=True)):
+    walks = (drive.ways != drive.ways[:, :1]).any(axis=(1, 2))
+    poses_at, numbers = _Ways(drive.ways[walks]).poses_at, np.cumsum(walks) - 1
+    for kind, way, moves, number in zip(drive.kinds, drive.ways, walks, numbers, strict=True):
         x, y, heading = way[0].tolist()
-        stands = bool((way == way[0]).all())
-        world.add(kind, kind, (x, y, heading) if stands else Member(walking.poses_at, number))
+        world.add(kind, kind, Member(poses_at, int(number)) if moves else (x, y, heading))
 
 
 class _Ways:

@@ -7,6 +7,7 @@ Widths follow the German RASt 06 (directives for urban streets).
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -62,10 +63,13 @@ class Curve:
         if self.curvature:
             along = np.minimum(np.maximum(rows[..., 0] - self.bend_at, 0.0), self.bend_length)
             turns = _turns(self.curvature * along.ravel())
+        return np.asarray(_placed(rows.reshape(-1, 3), turns, *self._line).reshape(rows.shape))
+
+    @cached_property
+    def _line(self) -> tuple[tuple[float, float], tuple[float, float, float, float, float]]:
         x, y, heading = map(float, self.start)
-        start = x, y, heading, float(np.cos(heading)), float(np.sin(heading))
-        bend = float(self.bend_at), float(self.bend_length)
-        return np.asarray(_placed(rows.reshape(-1, 3), turns, bend, start).reshape(rows.shape))
+        turn = float(np.cos(heading)), float(np.sin(heading))
+        return (float(self.bend_at), float(self.bend_length)), (x, y, heading, *turn)
 
 
 def _turns(turns: Floats) -> Floats:

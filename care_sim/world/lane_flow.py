@@ -141,7 +141,7 @@ class FlowingLane:
 
     def _stop_line(self) -> list[tuple[float, float]]:
         """Return place and speed of the obstacle at the stop line, if drivers give way."""
-        return [(self.stop_m, 0.0)] if np.isfinite(self.stop_m) else []
+        return [(self.stop_m, 0.0)] if math.isfinite(self.stop_m) else []
 
 
 class StreetTraffic:

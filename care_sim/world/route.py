@@ -1,6 +1,7 @@
 """Routes of a car: a sequence of straights and bends of constant curvature."""
 
 import math
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -82,7 +83,7 @@ class Route:
         return np.asarray(found)
 
     def _leg(self, s: float) -> "_PlacedLeg":
-        return next(leg for leg in self._legs if s < leg.begins + leg.length)
+        return self._legs[bisect_right(self._legs, s, key=lambda leg: leg.begins + leg.length)]
 
     @cached_property
     def _legs(self) -> tuple["_PlacedLeg", ...]:

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import chain
 
 import numpy as np
 
@@ -153,7 +152,10 @@ class World:
         self._kinds = {self.ego_body: self.ego_kind}
         self._alone: list[Actor] = []
         # Bodies and numbers of the members of each group.
-        self._groups: dict[Motions, tuple[list[int], list[int]]] = {}
+        self._groups: dict[Motions, list[tuple[int, int]]] = {}
+        # All bodies that may move: the ego, those alone, and members of groups.
+        self._moving = np.array([self.ego_body])
+        self._numbers: list[Integers] = []
         self._events: list[tuple[float, Callable[[], None]]] = []
         self._every_step: list[Callable[[World], None]] = []
         self._ego_motion = Ego(ego_speed)
@@ -189,11 +191,13 @@ class World:
         actor = Actor(name, kind, body, pose_at, reported, pose)
         self.actors.append(actor)
         if isinstance(pose, Member):
-            bodies, numbers = self._groups.setdefault(pose.poses_at, ([], []))
-            bodies.append(body)
-            numbers.append(pose.number)
+            self._groups.setdefault(pose.poses_at, []).append((body, pose.number))
         elif not isinstance(pose, tuple):
             self._alone.append(actor)
+        alone = [actor.body for actor in self._alone]
+        members = [np.array(rows).T for rows in self._groups.values()]
+        self._moving = np.concatenate([[self.ego_body, *alone], *(bodies for bodies, _ in members)])
+        self._numbers = [numbers for _, numbers in members]
         return actor
 
     def at(self, time: float, event: Callable[[], None]) -> None:
@@ -316,11 +320,12 @@ class World:
 
         # Poses are read after events, which may change who moves.
         poses = [self.ego.pose, *(actor.pose_at(self.time) for actor in self._alone)]
-        tables = [at(self.time)[numbers] for at, (_, numbers) in self._groups.items()]
+        groups = zip(self._groups, self._numbers, strict=True)
+        tables = [poses_at(self.time)[numbers] for poses_at, numbers in groups]
         self._put(np.concatenate([np.array(poses, float), *tables]), self._footprints.boxes)
 
     def _put(self, poses: Floats, before: Floats) -> None:
-        bodies, self._before = np.array(self._moving), before.copy()
+        bodies, self._before = self._moving, before.copy()
         self.bullet.move_all(bodies, poses)
         if not self._footprints.move_all(bodies, poses):
             names = {self.ego_body: "the ego"} | {actor.body: actor.name for actor in self.actors}
@@ -350,12 +355,6 @@ class World:
             vehicle = vehicles[body]
             assert isinstance(vehicle, RoadVehicle)
             vehicle.put(float(x), float(speed))
-
-    @property
-    def _moving(self) -> list[int]:
-        """Bodies that may move: the ego, those that move alone, and members of groups."""
-        alone = [actor.body for actor in self._alone]
-        return [self.ego_body, *alone, *chain(*(bodies for bodies, _ in self._groups.values()))]
 
     def close(self) -> None:
         """Free the simulator."""
