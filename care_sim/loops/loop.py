@@ -15,7 +15,7 @@ from care_sim.core.rig import Rig
 from care_sim.loops.episode import Episode
 from care_sim.loops.observation_limits import Limits
 from care_sim.loops.records import Records, Sight
-from care_sim.loops.stages.detecting import Detecting, Found
+from care_sim.loops.stages.detecting import Detecting
 from care_sim.loops.stages.driving import Driving
 from care_sim.loops.stages.judging import Judging
 from care_sim.loops.stages.locating import Locating
@@ -26,6 +26,7 @@ from care_sim.loops.stages.sight import Seeing
 from care_sim.loops.stages.state import Fired, State, load, seen_by
 from care_sim.loops.stages.tracking import Tracking
 from care_sim.loops.truth import Told, told_by
+from care_sim.perception.found import Found
 from care_sim.perception.points_only import Detector
 from care_sim.world.approach import Impact
 from care_sim.world.bullet import NO_BODY
@@ -69,7 +70,8 @@ class Loop:
         limits = Limits(rig)
         self.locating = Locating(rig, common, limits.ego, state)
         self.scanning = Scanning(rig, common, worlds, threads)
-        self._detecting = Detecting(rigs, detectors or [None] * worlds, common.min_returns)
+        makers = detectors or [None] * worlds
+        self._detecting = Detecting(rigs, makers, common.min_returns, threads)
         self._tracking = Tracking(rig.keyframe_s, common.velocity_keyframes)
         self.driving = Driving(rig, common, worlds)
         self._judging = Judging(rig, common, self.driving, worlds)

@@ -27,14 +27,10 @@ class Detector(ABC):
 
     `gathers`: number of sweeps per keyframe in the closed loop, its own included. `track_score`:
     least score of a detection that becomes a track. `files`: further files that it reads, beside
-    those of its parameters and entry point. `wants_points`: whether it reads more of a cloud than
-    cells and objects. `is_matched`: whether each detection belongs to the object behind it, so that
-    the scoring need not match their places.
+    those of its parameters and entry point.
     """
 
     gathers: int = 1
-    wants_points: bool = True
-    is_matched: bool = False
     track_score: float = 0.0
     files: tuple[Path, ...] = ()
 

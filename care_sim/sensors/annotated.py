@@ -61,7 +61,7 @@ class Cloud:
     (`care_sim.sensors.signal`) or a LiDAR recorded them. `times` (P,), seconds from the keyframe,
     exist where returns have their own (`care_sim.sensors.beams`). `shots` (P,) is how often a cell
     must be fired for each return; None where one shot is enough for all. `rings` (P,) number the
-    lasers of a recorded LiDAR. `ranges` (P,) are metres from the LiDAR, in clouds without `points`.
+    lasers of a recorded LiDAR.
 
     `far` holds a recorded LiDAR's returns from beyond the reach of the grid. Only real detectors
     get them, since they were trained with them; rays, proxies and scores ignore them. If sweeps are
@@ -77,7 +77,6 @@ class Cloud:
     rings: Integers | None = None
     far: "Cloud | None" = None
     poses: tuple["SweepPose", ...] = ()
-    ranges: Floats | None = None
     newest: "Cloud | None" = None
 
     def __len__(self) -> int:
@@ -107,7 +106,7 @@ class Cloud:
         """Return these rows in this order. Far returns stay."""
         return Cloud(
             self.cells[rows],
-            self.points.take(rows, axis=0) if self.ranges is None else self.points,
+            self.points.take(rows, axis=0),
             self.objects[rows],
             None if self.intensities is None else self.intensities[rows],
             None if self.times is None else self.times[rows],
@@ -115,7 +114,6 @@ class Cloud:
             None if self.rings is None else self.rings[rows],
             self.far,
             self.poses,
-            None if self.ranges is None else self.ranges[rows],
             self.newest,
         )
 
@@ -130,18 +128,15 @@ def joined(clouds: Sequence[Cloud]) -> Cloud:
     cells = np.concatenate([cloud.cells for cloud in clouds])
     order = np.argsort(cells, kind="stable")
     far = [cloud.far for cloud in clouds if cloud.far is not None]
-    points = np.concatenate([cloud.points for cloud in clouds])
-    ranges = _column([cloud.ranges for cloud in clouds], order)
     return Cloud(
         cells[order],
-        points[order] if ranges is None else points,
+        np.concatenate([cloud.points for cloud in clouds])[order],
         np.concatenate([cloud.objects for cloud in clouds])[order],
         _column([cloud.intensities for cloud in clouds], order),
         _column([cloud.times for cloud in clouds], order),
         _column([cloud.shots for cloud in clouds], order),
         _column([cloud.rings for cloud in clouds], order),
         far=joined(far) if far else None,
-        ranges=ranges,
     )
 
 
@@ -159,12 +154,6 @@ def cloud_of(scan: Scan, objects: Integers, grid: Grid) -> Cloud:
     rings = rings_of(scan.cells, grid)
     columns = (scan.intensities, scan.times)
     return Cloud(scan.cells, points, objects, *columns, rings=rings).take(returned)
-
-
-def pointless_cloud(scan: Scan, objects: Integers) -> Cloud:
-    """Return a cloud as `cloud_of` does, but with empty `points`."""
-    (rows,) = np.nonzero(np.isfinite(scan.ranges))
-    return Cloud(scan.cells[rows], np.empty((0, 3)), objects[rows], ranges=scan.ranges[rows])
 
 
 def rings_of(cells: Cells, grid: Grid) -> Integers:

@@ -1,58 +1,49 @@
 """The detectors of all worlds.
 
-The paper's proxy (`care_sim.perception.proxy`) detects in compiled code, any other detector world
-by world.
+The paper's proxy (`care_sim.perception.proxy`) and the measured detectors
+(`care_sim.perception.measured`) detect in compiled code, any other detector world by world.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.core.arrays import Floats, Integers, Mask, filled
+from care_sim.base.threads import Threads
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.rig import Rig
 from care_sim.core.types import Scan
 from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.gathering import Gathering, acted_on
 from care_sim.loops.stages.scanning import Returns
-from care_sim.loops.stages.state import Reported, State
+from care_sim.loops.stages.state import Reported, Sensors, State, seen_by
+from care_sim.perception.found import Found
 from care_sim.perception.matching import found_objects
+from care_sim.perception.measured.candidates import SCORE, SEEN, Candidates, X
+from care_sim.perception.measured.detector import MeasuredDetector
 from care_sim.perception.points_only import Detector
 from care_sim.perception.proxy import count_hits
-from care_sim.sensors.annotated import NO_OBJECT, Annotations, cloud_of, pointless_cloud
+from care_sim.sensors.annotated import NO_OBJECT, Annotations, cloud_of
 from care_sim.world.world import World
 
 
-class Found(NamedTuple):
-    """Detections of W worlds: `counts` (W,), `classes` (W, D), and `boxes` (W, D, 7) in the sensor
-    frames. `objects` (W, D) are the bodies behind them or NO_OBJECT. `tracks` (W, D) are the ids
-    from the track memory.
-    """
-
-    counts: Integers
-    classes: Integers
-    boxes: Floats
-    objects: Integers
-    tracks: Integers
-
-    def behind(self, world: int) -> Integers:
-        """(n,) the bodies behind the detections of a world."""
-        behind: Integers = self.objects[world, : self.counts[world]]
-        return behind
-
-
 class Detecting:
-    """The `detectors` (W,); all None for the proxy with its threshold. Returned arrays are reused
-    at the next keyframe.
+    """The `detectors` (W,); all None for the proxy with its threshold, or all measured with equal
+    parameters. Returned arrays are reused at the next keyframe.
     """
 
     bodies: list[Integers]
-    """(W,) the bodies that a detector other than the proxy found, by the scoring's match."""
+    """(W,) the bodies that a detector of one world found, by the scoring's match."""
     detected: Mask
     """(W,) where the first-sighting actor is detected at the last keyframe."""
 
-    def __init__(self, rigs: Sequence[Rig], detectors: Sequence[Detector | None], min_returns: int):
+    def __init__(
+        self,
+        rigs: Sequence[Rig],
+        detectors: Sequence[Detector | None],
+        min_returns: int,
+        threads: Threads,
+    ):
         worlds = len(detectors)
         self._rigs = rigs
         self._makers = detectors
@@ -60,61 +51,68 @@ class Detecting:
         self._ones: list[_OneDetector | None] = [None] * worlds
         self.is_proxy = all(one is None for one in detectors)
         """Whether all detect by the number of returns."""
+        first, self._measured = detectors[0], None
+        if isinstance(first, MeasuredDetector):
+            self._measured = first.worlds(worlds, rigs[0], False, threads)
         self.bodies = [np.empty(0, np.int64)] * worlds
         self.detected = np.zeros(worlds, np.bool_)
-        empty = np.empty((worlds, 0), np.int64)
-        none = np.zeros(worlds, np.int64)
-        self._found = Found(none, empty, np.empty((worlds, 0, 7)), empty, empty)
+        self._found = Found.of(worlds)
 
     def begin(self, world: int, built: World, seeds: SensorSeeds) -> None:
         """Begin an episode."""
         maker = self._makers[world]
-        if maker is not None:
+        if self._measured is not None:
+            self._measured.begin(world, seeds.detector, len(built.labels()))
+        elif maker is not None:
             self._ones[world] = _OneDetector(self._rigs[world], maker, built, seeds.detector)
 
     def detect(self, state: State, returns: Returns, scans: Sequence[Scan | None]) -> Found:
         """The detections in the worlds that are live. `scans` (W,) are those of LiDARs that fire
         world by world.
         """
-        found = self._found
-        if self.is_proxy:
-            shape = state.reported.bodies.shape
-            if found.objects.shape != shape:
-                room = [np.empty(shape, np.int64) for _ in range(3)]
-                found = Found(found.counts, room[0], np.empty((*shape, 7)), *room[1:])
-                self._found = found
-            hits = state.live, returns.counts, returns.ids
-            told = state.egos.targets, self.detected
-            _detect(*hits, state.reported, self._least, found, *told)
-            return found
+        live, reported, found = state.live, state.reported, self._found
+        counts, cells, ranges, ids = returns
+        if self._measured is not None:
+            candidates = self._measured.advance(live, state.sensors.poses)
+            _see(live, state.sensors, candidates)
+            given = reported[:4], (counts, cells, ids), (counts, cells, ranges)
+            found = self._measured.report(live, *given, found)
+        elif self.is_proxy:
+            found = found.with_room(reported.bodies.shape[1])
+            _detect(live, counts, ids, reported, self._least, found)
+        else:
+            return self._one_by_one(state, returns, scans)
+        self._found = found
+        is_used = np.arange(found.objects.shape[1]) < found.counts[:, None]
+        self.detected = (is_used & (found.objects == state.egos.targets[:, None])).any(axis=1)
+        return found
+
+    def _one_by_one(self, state: State, returns: Returns, scans: Sequence[Scan | None]) -> Found:
+        told = {}
         for world in np.flatnonzero(state.live).tolist():
-            one = self._ones[world]
+            one, count = self._ones[world], returns.counts[world]
             assert one is not None
-            count = returns.counts[world]
             scan = scans[world] or Scan(
                 returns.cells[world, :count].copy(), returns.ranges[world, :count].copy()
             )
-            classes, boxes, behind, self.bodies[world] = one.detect(
-                state, world, scan, returns.ids[world, :count]
-            )
-            self.detected[world] = state.egos.targets[world] in self.bodies[world]
+            told[world] = one.detect(state, world, scan, returns.ids[world, :count])
+        most = max((len(classes) for classes, *_ in told.values()), default=0)
+        found = self._found = self._found.with_room(most)
+        for world, (classes, boxes, behind, bodies) in told.items():
+            own = world, slice(len(classes))
             found.counts[world] = len(classes)
-            found = self._found = Found(
-                found.counts,
-                filled(found.classes, world, classes),
-                filled(found.boxes, world, boxes),
-                filled(found.objects, world, behind),
-                filled(found.tracks, world, behind),
-            )
+            found.classes[own], found.boxes[own], found.objects[own] = classes, boxes, behind
+            self.bodies[world] = bodies
+            self.detected[world] = state.egos.targets[world] in bodies
         return found
 
     def bodies_found(self, found: Found, world: int) -> Integers:
-        """(n,) all bodies that are detected in a world."""
-        return found.behind(world) if self.is_proxy else self.bodies[world]
+        """(n,) all bodies that are detected in a world, and NO_OBJECT for a false box."""
+        return found.behind(world) if self._ones[world] is None else self.bodies[world]
 
 
 class _OneDetector:
-    """A detector other than the proxy in one world."""
+    """A detector that detects world by world, in one of them."""
 
     def __init__(
         self, rig: Rig, detector: Detector, built: World, seed: np.random.SeedSequence
@@ -141,11 +139,7 @@ class _OneDetector:
         """
         detector, sensor = self._detector, state.sensors.frame(world)
         objects = self._named[np.minimum(bodies, len(self._named) - 2)]
-        cloud = (
-            cloud_of(scan, objects, self._grid)
-            if detector.wants_points
-            else pointless_cloud(scan, objects)
-        )
+        cloud = cloud_of(scan, objects, self._grid)
         present = _present(state, world)
         if self._gathering is not None:
             cloud = self._gathering.add(cloud, state.taken.frame(world))
@@ -155,11 +149,9 @@ class _OneDetector:
             sure = acted_on(detections, detector.track_score)
             if not sure.all():
                 detections, behind = detections.take(sure), behind[sure]
-        given = detections.classes, detections.boxes, behind
-        if detector.is_matched:
-            return *given, behind[behind != NO_OBJECT]
         candidates = present.take((present.objects[:, None] == behind).any(axis=1))
-        return *given, candidates.objects[found_objects(candidates, detections)]
+        bodies = candidates.objects[found_objects(candidates, detections)]
+        return detections.classes, detections.boxes, behind, bodies
 
 
 def _present(state: State, world: int) -> Annotations:
@@ -177,25 +169,30 @@ def _detect(
     reported: Reported,
     least: int,
     found: Found,
-    targets: Integers,
-    detected: Mask,
 ) -> None:
-    """Fill `found` with the reported bodies that at least `least` returns hit, and `detected` (W,)
-    with whether these bodies hold the target. `ids` (W, F) are the bodies of the returns, `counts`
-    (W,) of them in use.
+    """Fill `found` with the reported bodies that at least `least` returns hit. `ids` (W, F) are the
+    bodies of the returns, `counts` (W,) of them in use.
     """
     for w in range(len(live)):
         if not live[w]:
             continue
         known = reported.bodies[w, : reported.counts[w]]
         hits = count_hits(known, ids[w, : counts[w]])
-        count, detected[w] = 0, False
+        count = 0
         for row in range(len(known)):
             if hits[row] >= least:
-                detected[w] |= known[row] == targets[w]
                 found.classes[w, count] = reported.classes[w, row]
                 found.objects[w, count] = known[row]
                 for k in range(7):
                     found.boxes[w, count, k] = reported.boxes[w, row, k]
                 count += 1
         found.counts[w] = count
+
+
+@compiled(brief=True)
+def _see(live: Mask, sensors: Sensors, candidates: Candidates) -> None:
+    """Fill in the boxes of candidates in the sensor frames."""
+    for w in range(len(live)):
+        if live[w]:
+            rows = candidates.rows[w, : candidates.counts[w]]
+            rows[:, SEEN:] = seen_by(sensors, w, rows[:, X:SCORE])

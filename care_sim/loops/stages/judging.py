@@ -14,9 +14,10 @@ from care_sim.core.rig import Rig
 from care_sim.driving.corridor import enters_strip
 from care_sim.loops.needless import NeedlessBraking, UnfoundedBraking, in_the_way
 from care_sim.loops.records import Sight
-from care_sim.loops.stages.detecting import Detecting, Found
+from care_sim.loops.stages.detecting import Detecting
 from care_sim.loops.stages.driving import Ahead, Driving
 from care_sim.loops.stages.state import State, seen_by
+from care_sim.perception.found import Found
 from care_sim.world.world import World
 
 

@@ -5,8 +5,8 @@ import numpy as np
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers, Mask, longer
 from care_sim.core.types import Tracks
-from care_sim.loops.stages.detecting import Found
 from care_sim.loops.stages.state import Sensors, State, TrackTables, placed_by, seen_by
+from care_sim.perception.found import Found
 from care_sim.perception.tracker import (
     MemoryRules,
     advance_tracks,

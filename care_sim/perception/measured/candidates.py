@@ -27,12 +27,12 @@ TILE_M = 20.0
 """Side of a tile. Candidates are made for tiles within reach."""
 LONGEST_LIVES = 20
 """Longest life in mean lives: one of 500 million candidates lasts longer."""
-LABEL, X, Y, SCORE, LAST, AHEAD, RANK, KIND = 0, 1, 2, 8, 9, 10, 11, 12
-"""Columns of a table of candidates (n, 13): class, world box (7) without its height above the road,
-score, last keyframe, a uniform number, rank, row of `Kinds`. A candidate may be on the road ahead
-if the number is below `kept_ahead`.
+LABEL, X, Y, SCORE, LAST, AHEAD, RANK, KIND, SEEN = 0, 1, 2, 8, 9, 10, 11, 12, 13
+"""Columns of a table of candidates (n, 20): class, world box (7) without its height above the road,
+score, last keyframe, a uniform number, rank, row of `Kinds`, box (7) in the sensor frame. A
+candidate may be on the road ahead if the number is below `kept_ahead`.
 """
-COLUMNS = KIND + 1
+COLUMNS = SEEN + 7
 
 Place = tuple[float, float]
 """World x and y, metres."""
@@ -59,10 +59,22 @@ class Kinds(NamedTuple):
     """
     log_sizes: Floats
     """(k, 3, 2) mean and spread of the logarithms of length, width and height."""
+    least: float
+    """Least score of a candidate. Every least score chooses from the same ones."""
 
 
-def kinds_of(measured: Measurement, keyframe_s: float) -> Kinds:
-    """Return the kinds of a detector for a keyframe length."""
+class Candidates(NamedTuple):
+    """The candidates of W worlds: `rows` (W, C, 20), of which `counts` (W,) are in use. `before`
+    (W, 2) are the places of the sensors at the last keyframe, nan at the start.
+    """
+
+    counts: Integers
+    rows: Floats
+    before: Floats
+
+
+def kinds_of(measured: Measurement, keyframe_s: float, least: float) -> Kinds:
+    """Return the kinds of a detector for a keyframe length and a least score."""
     known = measured.false_boxes
     lasting = np.array([one.lasting for one in known])
     lives = np.array([one.lasts_s for one in known])
@@ -88,22 +100,22 @@ def kinds_of(measured: Measurement, keyframe_s: float) -> Kinds:
         np.tile(table[0], (2, 1)),
         np.tile(table[1], (2, 1)),
         np.tile(np.array([one.log_sizes for one in known]), (2, 1, 1)),
+        float(least),
     )
 
 
 @compiled()
 def advance_candidates(
-    table: Floats, seed: np.uint64, keyframe: int, place: Place, before: Place, kinds: Kinds
-) -> Floats:
-    """Return the candidates (n, 13) of a keyframe within reach of a sensor at `place`, from those
-    of the keyframe before at its earlier place (nan at the start).
+    w: int, clock: tuple[np.uint64, int], place: Place, candidates: Candidates, kinds: Kinds
+) -> int:
+    """Advance the candidates of a world `w` to a keyframe, within reach of a sensor at `place`. The
+    `clock` holds the episode's seed and the keyframe.
+
+    Return how many rows they need. If the table has fewer, call again with a longer one.
     """
-    living, count = np.empty((2 * len(table) + 16, COLUMNS)), 0
-    for row in table:
-        tile = math.floor(row[X] / TILE_M), math.floor(row[Y] / TILE_M)
-        if row[LAST] >= keyframe and _is_near(tile, place):
-            living[count] = row
-            count += 1
+    (seed, keyframe), rows = clock, candidates.rows[w]
+    before = candidates.before[w, 0], candidates.before[w, 1]
+    count = candidates.counts[w] = _keep_living(rows, candidates.counts[w], keyframe, place)
     across, along = _tiles(place[0]), _tiles(place[1])
     for i in range(across[0], across[1]):
         for j in range(along[0], along[1]):
@@ -112,16 +124,34 @@ def advance_candidates(
                 first = keyframe
                 if not _is_near((i, j), before):
                     first = max(0, keyframe - math.ceil(LONGEST_LIVES * kinds.lives.max()))
-                living, count = _add_births(living, count, seed, (i, j), (first, keyframe), kinds)
-    return living[:count]
+                count = _add_births(rows, count, seed, (i, j), (first, keyframe), kinds)
+    if count <= len(rows):
+        candidates.counts[w] = count
+        candidates.before[w, 0], candidates.before[w, 1] = place
+    return count
+
+
+@compiled()
+def _keep_living(rows: Floats, count: int, keyframe: int, place: Place) -> int:
+    """Move those of the first `count` candidates to the front that live and are within reach.
+    Return their number.
+    """
+    kept = 0
+    for n in range(count):
+        tile = math.floor(rows[n, X] / TILE_M), math.floor(rows[n, Y] / TILE_M)
+        if rows[n, LAST] >= keyframe and _is_near(tile, place):
+            for column in range(SEEN):
+                rows[kept, column] = rows[n, column]
+            kept += 1
+    return kept
 
 
 @compiled()
 def _add_births(
-    living: Floats, count: int, seed: np.uint64, tile: Tile, time: tuple[int, int], kinds: Kinds
-) -> tuple[Floats, int]:
+    rows: Floats, count: int, seed: np.uint64, tile: Tile, time: tuple[int, int], kinds: Kinds
+) -> int:
     """Add a tile's candidates to the `count` in a table: those born within the keyframes of `time`
-    and alive at its end. Returns the table, or a longer one.
+    and alive at its end. Return their new number, in which those without room count too.
     """
     first, keyframe = time
     key = mixed(mixed(seed, tile[0] + 2**40), tile[1] + 2**40)
@@ -135,12 +165,13 @@ def _add_births(
             last = born + math.floor(-kinds.lives[kind] * math.log(uniform(own, 1)))
             if last < keyframe:
                 continue
-            if count == len(living):
-                living = np.concatenate((living, np.empty_like(living)))
-            _fill(living[count], own, tile, kind, kinds)
-            living[count, LAST] = last
-            count += 1
-    return living, count
+            score = _score_at(kinds.scores[kind], kinds.logs[kind], uniform(own, 5))
+            if score >= kinds.least:
+                if count < len(rows):
+                    _fill(rows[count], own, tile, kind, kinds)
+                    rows[count, SCORE], rows[count, LAST] = score, last
+                count += 1
+    return count
 
 
 @compiled()
@@ -172,8 +203,8 @@ def _poisson(share: float, mean: float) -> int:
 
 @compiled()
 def _fill(row: Floats, key: np.uint64, tile: Tile, kind: int, kinds: Kinds) -> None:
-    """Draw a candidate of a tile into its row. Uniform numbers 0 and 1 of its key are already
-    used.
+    """Draw a candidate of a tile into its row. The numbers 0, 1 and 5 of its key draw its kind,
+    life and score.
     """
     row[LABEL], row[KIND] = kinds.labels[kind], kind
     row[X] = (tile[0] + uniform(key, 2)) * TILE_M
@@ -183,7 +214,6 @@ def _fill(row: Floats, key: np.uint64, tile: Tile, kind: int, kinds: Kinds) -> N
         mean, spread = kinds.log_sizes[kind, side]
         row[4 + side] = math.exp(mean + spread * normal(key, 4 + side))
     row[7] = 2 * math.pi * uniform(key, 4)
-    row[SCORE] = _score_at(kinds.scores[kind], kinds.logs[kind], uniform(key, 5))
     row[RANK], row[AHEAD] = uniform(key, 6), uniform(key, 7)
 
 

@@ -7,24 +7,30 @@ import numpy as np
 
 from care_sim.base.checks import check_flag, check_number
 from care_sim.base.errors import InvalidInput
+from care_sim.base.threads import ALONE, Threads
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.core.types import Detections
-from care_sim.perception.measured.false_boxes import FalseBoxPopulation
-from care_sim.perception.measured.luck import CHANNELS, Memory, shares_of
+from care_sim.perception.found import Found
+from care_sim.perception.measured.candidates import SCORE, SEEN, X, kinds_of
+from care_sim.perception.measured.luck import shares_of
 from care_sim.perception.measured.recall import FIRST_HIT
-from care_sim.perception.measured.reporting import report_objects
-from care_sim.perception.measured.tables import SIGNALS, Measurement, measurement
+from care_sim.perception.measured.reporting import Rules
+from care_sim.perception.measured.tables import Measurement, measurement
+from care_sim.perception.measured.worlds import MeasuredWorlds
 from care_sim.perception.points_only import Detector
-from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud
+from care_sim.sensors.annotated import Annotations, Cloud
 
 GATHERED_S = 1.0
 """In the closed loop, and in films with short keyframes, a detector that gathers ten sweeps has
 those of the last ten keyframes, of 0.1 s each. With longer keyframes it has as many as fit in this
 time.
 """
+
+
+_HERE = np.ones(1, np.bool_)
 
 
 class MeasuredDetector(Detector):
@@ -68,6 +74,30 @@ class MeasuredDetector(Detector):
         self.errors = measured.errors if box_errors else measured.errors.without()
         self.track_score = float(measured.reported(np.array(least)))
 
+    def worlds(self, count: int, rig: Rig, is_filmed: bool, threads: Threads) -> MeasuredWorlds:
+        """Return this detector in so many worlds, which `threads` share."""
+        measured = self.measured
+        # The closed loop drops boxes that become no track, so they need not be made.
+        least = measured.least_score if is_filmed else self.least_tracked
+        kinds = kinds_of(measured, rig.keyframe_s, least)
+        if not self.false_boxes:
+            kinds = kinds._replace(means=np.zeros_like(kinds.means))
+        worth, angles = measured.recall.worth, cell_angles(rig)
+        if self.worth is not None:
+            worth, angles = np.full_like(worth, self.worth), np.ones_like(angles)
+        rules = Rules(
+            measured.recall._replace(worth=worth),
+            shares_of(measured.luck, rig.keyframe_s, measured.flash_s),
+            self.errors,
+            kinds,
+            sweep_weights(measured, self.first_hit, rig.keyframe_s, is_filmed),
+            angles,
+            float(measured.most_score),
+            float(measured.kept_ahead),
+            float(rig.sensor_height_m),
+        )
+        return MeasuredWorlds(rules, rig.grid, count, threads)
+
     def begin(self, seed: np.random.SeedSequence, rig: Rig, is_filmed: bool) -> Detector:
         """See `care_sim.perception.points_only.Detector`."""
         return MeasuredEpisode(self, seed, rig, is_filmed)
@@ -98,41 +128,18 @@ class PointRCNN(MeasuredDetector):
 class MeasuredEpisode(Detector):
     """A measured detector in one episode; call `detect` once per keyframe."""
 
-    wants_points = False
-    is_matched = True
-
     def __init__(
         self, rules: MeasuredDetector, seed: np.random.SeedSequence, rig: Rig, is_filmed: bool
     ):
-        measured = rules.measured
         self.track_score = rules.track_score
-        self._measured = measured
-        self._errors = rules.errors
-        # The closed loop drops boxes that become no track, so they need not be made.
-        self._least = measured.least_score if is_filmed else rules.least_tracked
-        worth = measured.recall.worth
-        if rules.worth is not None:
-            worth = np.full(len(worth), float(rules.worth))
-        self._table = measured.recall._replace(worth=worth)
-        self._heads = [head.first for head in rig.grid.heads]
-        self._angles = cell_angles(rig) if rules.worth is None else np.ones(len(self._heads))
-        self._weights = sweep_weights(measured, rules.first_hit, rig.keyframe_s, is_filmed)
-        self._seed = seed.generate_state(1, np.uint64)[0]
-        self._shares = shares_of(measured.luck, rig.keyframe_s, measured.flash_s)
-        self._false = (
-            FalseBoxPopulation(
-                measured, self._least, rig.grid, rig.sensor_height_m, rig.keyframe_s, seed
-            )
-            if rules.false_boxes
-            else None
-        )
+        self._measured = rules.measured
+        self._grid = rig.grid
+        self._world = rules.worlds(1, rig, is_filmed, ALONE)
+        self._world.begin(0, seed)
         self._sensor = Frame(0.0, 0.0, rig.sensor_height_m, 0.0)
-        self._keyframe = 0
+        self._found = Found.of(1)
         self._rows: dict[int, int] = {}
-        none = np.empty(0, np.int64)
-        self._objects, self._places, self._ascending, self._ranks = none, none, none, none
-        self._memory = Memory(none, np.empty((0, len(SIGNALS)), np.int64), np.empty((0, CHANNELS)))
-        self._counts = np.empty((0, len(self._weights)))
+        self._objects = np.empty(0, np.int64)
 
     def at(self, token: str | None, sensor: Frame) -> None:
         """See `care_sim.perception.points_only.Detector`."""
@@ -141,48 +148,43 @@ class MeasuredEpisode(Detector):
     def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
         """See `care_sim.perception.points_only.Detector`."""
         self._meet(annotations.objects)
-        rows, boxes, scores, returns = report_objects(
-            (self._seed, self._keyframe),
-            (annotations.objects, annotations.classes, self._places),
-            np.ascontiguousarray(annotations.boxes, float),
-            (cloud.objects, self._ascending, self._ranks, max(len(cloud.poses), 1)),
-            (np.append(np.searchsorted(cloud.cells, self._heads), len(cloud)), self._angles),
-            self._memory,
-            (self._counts, self._weights),
-            (self._table, self._shares, self._errors),
-            (self._least, self._measured.most_score),
+        sensor, world = self._sensor, self._world
+        candidates = world.advance(_HERE, np.array([[sensor.x, sensor.y]], float))
+        rows = candidates.rows[0, : candidates.counts[0]]
+        rows[:, SEEN:] = sensor.boxes_to_local(rows[:, X:SCORE])
+        classes, boxes = annotations.classes, np.ascontiguousarray(annotations.boxes, float)
+        newest = cloud if cloud.newest is None else cloud.newest
+        ranges = self._grid.ranges_to(newest.cells, newest.points)
+        found = self._found = world.report(
+            _HERE,
+            (_count(classes), annotations.objects[None], classes[None], boxes[None]),
+            (_count(cloud.cells), cloud.cells[None], cloud.objects[None]),
+            (_count(ranges), newest.cells[None], ranges[None]),
+            self._found,
+            max(len(cloud.poses), 1),
         )
-        classes, objects = annotations.classes[rows], annotations.objects[rows]
-        if self._false is not None:
-            false = self._false.draw(self._keyframe, self._sensor, cloud, annotations)
-            classes = np.concatenate([classes, false.classes])
-            boxes = np.concatenate([boxes, false.boxes])
-            scores = np.concatenate([scores, false.scores])
-            returns = np.concatenate([returns, false.returns])
-            objects = np.concatenate([objects, np.full(len(false.classes), NO_OBJECT)])
-        self._keyframe += 1
-        return Detections(classes, boxes, returns, self._measured.reported(scores)), objects
+        # The tables are reused at the next keyframe.
+        own = 0, slice(found.counts[0])
+        scores = self._measured.reported(found.scores[own].copy())
+        columns = found.classes[own].copy(), found.boxes[own].copy(), found.returns[own].copy()
+        return Detections(*columns, scores), found.objects[own].copy()
 
     def _meet(self, objects: Integers) -> None:
-        """Return the rows of this keyframe's `objects` (n,), adding rows of new ones."""
-        # The closed loop reports the same bodies at every keyframe.
+        """Give new ones of this keyframe's `objects` (n,) a row of memory."""
         if np.array_equal(objects, self._objects):
             return
-        known = self._rows
-        self._places = np.array(
-            [known.setdefault(one, len(known)) for one in objects.tolist()], int
-        )
-        order = np.argsort(objects)
-        self._objects, self._ascending = objects, objects[order]
-        self._ranks = np.argsort(order)
-        if (new := len(known) - len(self._counts)) > 0:
-            first, last, processes = self._memory
-            self._memory = Memory(
-                np.concatenate([first, np.full(new, self._keyframe)]),
-                np.concatenate([last, np.full((new, len(SIGNALS)), -1)]),
-                np.concatenate([processes, np.zeros((new, CHANNELS))]),
-            )
-            self._counts = np.concatenate([self._counts, np.zeros((new, self._counts.shape[1]))])
+        known, world = self._rows, self._world
+        met = len(known)
+        rows = [known.setdefault(one, len(known)) for one in objects.tolist()]
+        world.make_room(len(known))
+        world.memory.first[0, met:] = world.keyframe(0)
+        world.memory.rows[0, : len(rows)] = rows
+        world.memory.ranks[0, : len(rows)] = np.argsort(np.argsort(objects))
+        self._objects = objects
+
+
+def _count(rows: np.ndarray) -> Integers:
+    return np.array([len(rows)])
 
 
 def sweep_weights(

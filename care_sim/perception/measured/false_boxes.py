@@ -7,28 +7,23 @@ from typing import NamedTuple
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.base.errors import InvalidInput
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.cells.stack import Grid
-from care_sim.core.frames import Frame
-from care_sim.core.types import Detections
+from care_sim.perception.found import Found
 from care_sim.perception.matching import MATCH_M
 from care_sim.perception.measured.candidates import (
     AHEAD,
-    COLUMNS,
     KIND,
     LABEL,
     RANK,
     REACH_M,
     RING_M,
     SCORE,
-    Place,
-    X,
-    advance_candidates,
-    kinds_of,
+    SEEN,
+    Candidates,
 )
-from care_sim.perception.measured.tables import Measurement
-from care_sim.sensors.annotated import Annotations, Cloud
+from care_sim.perception.measured.reporting import Rules, copy_box
+from care_sim.sensors.annotated import NO_OBJECT
 
 FREE_WIDTH_M, FREE_LENGTH_M = 3.0, 20.0
 """Width and length of the road ahead, where false boxes are rare. None of 1,342 false boxes with a
@@ -39,8 +34,9 @@ SHORT_M = 0.5
 
 
 class View(NamedTuple):
-    """The cells of one LiDAR by ascending azimuth: cells, azimuths, elevations and their cosines.
-    Also the ground distances at which their rays meet the road, and the angle between two rows.
+    """The cells of every LiDAR by ascending azimuth, those of the first LiDAR first: cells,
+    azimuths, elevations and their cosines. Also the ground distances at which their rays meet the
+    road.
     """
 
     cells: Integers
@@ -48,162 +44,117 @@ class View(NamedTuple):
     elevations: Floats
     cosines: Floats
     roads: Floats
-    row_height: float
-
-
-class FalseBoxPopulation:
-    """The false boxes of one episode with scores of `least_score` or more. The sensor is
-    `sensor_height_m` above the road, and keyframes are `keyframe_s` apart.
-    """
-
-    def __init__(
-        self,
-        measured: Measurement,
-        least_score: float,
-        grid: Grid,
-        sensor_height_m: float,
-        keyframe_s: float,
-        seed: np.random.SeedSequence,
-    ):
-        self._scores = least_score, measured.most_score
-        self._kept_ahead = measured.kept_ahead
-        self._height_m = sensor_height_m
-        self._kinds = kinds_of(measured, keyframe_s)
-        self._grid = grid
-        self._seed = seed.generate_state(1, np.uint64)[0]
-        self._table = np.empty((0, COLUMNS))
-        self._before: Place = math.nan, math.nan
-
-    def draw(self, keyframe: int, sensor: Frame, cloud: Cloud, present: Annotations) -> Detections:
-        """Return the false boxes of a keyframe, with scores in the detector's own scale.
-
-        A box is reported only where the scan looks at its place. Within MATCH_M of an object of its
-        class a box would be a detection of that object, so no false box is there.
-        """
-        place = float(sensor.x), float(sensor.y)
-        self._table = advance_candidates(
-            self._table, self._seed, keyframe, place, self._before, self._kinds
-        )
-        self._before = place
-        # Every least score chooses from the same candidates.
-        table = self._table[self._table[:, SCORE] >= self._scores[0]]
-        boxes = sensor.boxes_to_local(table[:, X:SCORE])
-        boxes[:, 2] = boxes[:, 5] / 2 - self._height_m
-        kept = _candidates_now(
-            (table, boxes, self._kinds.shares, self._kept_ahead),
-            present.classes,
-            np.ascontiguousarray(present.boxes, float),
-        )
-        # Cells are in the current sensor frame: only the last of gathered sweeps counts.
-        newest = cloud if cloud.newest is None else cloud.newest
-        farthest, in_view = _farthest(newest, self._grid), np.zeros(len(kept), np.bool_)
-        for head, view in zip(self._grid.heads, _views(self._grid, self._height_m), strict=True):
-            in_view |= _are_in_view(head.boxes(boxes[kept]), farthest, view)
-        kept = kept[in_view]
-        rows = table[kept]
-        none = np.zeros(len(kept), np.int64)
-        scores = np.minimum(rows[:, SCORE], self._scores[1])
-        return Detections(rows[:, LABEL].astype(np.int64), boxes[kept], none, scores)
+    firsts: Integers
+    """(h + 1,) where the cells of each LiDAR begin and end."""
+    places: Floats
+    """(h, 3) where the LiDARs are in the sensor frame."""
+    row_heights: Floats
+    """(h,) the angles between two rows."""
 
 
 @lru_cache(8)
-def _views(grid: Grid, sensor_height_m: float) -> tuple[View, ...]:
-    views = []
+def view_of(grid: Grid, sensor_height_m: float) -> View:
+    """Return the view of a sensor `sensor_height_m` above the road."""
+    columns = []
     for head in grid.heads:
         x, y, z = head.grid.directions.T
         azimuths, elevations = np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))
         down = np.tan(np.minimum(elevations, -1e-9))
         roads = np.where(elevations < 0, -(sensor_height_m + head.place[2]) / down, np.inf)
         order = np.argsort(azimuths)
-        views.append(
-            View(
-                head.first + order,
-                azimuths[order],
-                elevations[order],
-                np.cos(elevations)[order],
-                roads[order],
-                float(head.grid.row_height),
-            )
-        )
-    return tuple(views)
-
-
-def _farthest(cloud: Cloud, grid: Grid) -> Floats:
-    """Return (N,) the farthest range of each cell from its LiDAR, metres, 0 without a return."""
-    known = cloud.points if cloud.ranges is None else cloud.ranges
-    if len(known) != len(cloud):
-        raise InvalidInput(f"a cloud must have a range per return: {len(known)} of {len(cloud)}")
-    ranges = grid.ranges_to(cloud.cells, known) if cloud.ranges is None else known
-    farthest = np.zeros(grid.size)
-    np.maximum.at(farthest, cloud.cells, ranges)
-    return farthest
+        cosines = np.cos(elevations)
+        own = azimuths, elevations, cosines, roads
+        columns.append([head.first + order, *(column[order] for column in own)])
+    cells, azimuths, elevations, cosines, roads = map(np.concatenate, zip(*columns, strict=True))
+    return View(
+        cells,
+        azimuths,
+        elevations,
+        cosines,
+        roads,
+        np.array([*(head.first for head in grid.heads), grid.size]),
+        np.array([head.place for head in grid.heads], float),
+        np.array([head.grid.row_height for head in grid.heads], float),
+    )
 
 
 @compiled()
-def _candidates_now(
-    candidates: tuple[Floats, Floats, Floats, float], classes: Integers, present: Floats
-) -> Integers:
-    """Return the rows (k,) of the candidates that a free view would show. `candidates` are their
-    table (n, 13), boxes (n, 7) in the sensor frame, shares by ring and `kept_ahead`. `present` are
-    the boxes (m, 7) of objects of `classes` (m,).
+def report_false_boxes(
+    w: int,
+    candidates: Candidates,
+    present: tuple[Integers, Floats],
+    farthest: Floats,
+    view: View,
+    rules: Rules,
+    found: Found,
+) -> None:
+    """Add the false boxes of a world `w` to those `found`. `farthest` (N,) are the ranges of all
+    cells, 0 without a return. `present` are the classes (n,) and boxes (n, 7) of its objects.
     """
-    table, boxes, shares, kept_ahead = candidates
-    shown, count = np.empty(len(boxes), np.int64), 0
-    for n in range(len(boxes)):
-        x, y = boxes[n, 0], boxes[n, 1]
-        away = math.hypot(x, y)
-        if away >= REACH_M or table[n, RANK] >= shares[int(table[n, KIND]), int(away / RING_M)]:
-            continue
-        ahead = 0.0 < x < FREE_LENGTH_M and abs(y) < FREE_WIDTH_M / 2
-        if ahead and table[n, AHEAD] >= kept_ahead:
-            continue
-        if not _is_of_another(x, y, table[n, LABEL], classes, present):
-            shown[count] = n
-            count += 1
-    return shown[:count]
+    for row in candidates.rows[w, : candidates.counts[w]]:
+        box = row[SEEN:]
+        box[2] = box[5] / 2 - rules.sensor_height_m
+        if _is_free(row, present, rules) and _is_in_view(box, farthest, view):
+            at = found.counts[w]
+            found.classes[w, at], found.objects[w, at] = int(row[LABEL]), NO_OBJECT
+            found.scores[w, at], found.returns[w, at] = min(row[SCORE], rules.most), 0
+            copy_box(box, found.boxes[w, at])
+            found.counts[w] += 1
 
 
 @compiled()
-def _is_of_another(x: float, y: float, label: float, classes: Integers, boxes: Floats) -> bool:
-    """Whether a box at x, y is within MATCH_M of one of `boxes` (n, 7) of its class."""
-    for row in range(len(boxes)):
-        away = math.hypot(x - boxes[row, 0], y - boxes[row, 1])
-        if classes[row] == label and away <= MATCH_M:
-            return True
-    return False
-
-
-@compiled()
-def _are_in_view(boxes: Floats, farthest: Floats, view: View) -> Mask:
-    """Return (n,) which of `boxes` (n, 7) the LiDAR has in view."""
-    in_view = np.empty(len(boxes), np.bool_)
+def _is_free(row: Floats, present: tuple[Integers, Floats], rules: Rules) -> bool:
+    """Whether a free view would show a candidate (20,). Within MATCH_M of an object of its class a
+    box would be a detection of that object, so no false box is there.
+    """
+    x, y = row[SEEN], row[SEEN + 1]
+    away = math.hypot(x, y)
+    shares = rules.kinds.shares[int(row[KIND])]
+    if away >= REACH_M or row[RANK] >= shares[int(away / RING_M)]:
+        return False
+    if 0.0 < x < FREE_LENGTH_M and abs(y) < FREE_WIDTH_M / 2 and row[AHEAD] >= rules.kept_ahead:
+        return False
+    classes, boxes = present
     for n in range(len(boxes)):
-        in_view[n] = _is_in_view(boxes[n], farthest, view)
-    return in_view
+        if classes[n] == row[LABEL] and math.hypot(x - boxes[n, 0], y - boxes[n, 1]) <= MATCH_M:
+            return False
+    return True
 
 
 @compiled()
 def _is_in_view(box: Floats, farthest: Floats, view: View) -> bool:
-    """Return True if a ray ends at a `box` (7,) or beyond; `farthest` (N,) are the ranges of all
-    cells, 0 without a return. A ray of the row below may also end on the road before the box. A ray
-    at the height of the box that ends too early rules this out, since a wall may stand between.
+    """Whether a LiDAR has a `box` (7,) in view; see `report_false_boxes`."""
+    seen = False
+    for head in range(len(view.places)):
+        seen = seen or _is_in_view_of(head, box, farthest, view)
+    return seen
+
+
+@compiled()
+def _is_in_view_of(head: int, box: Floats, farthest: Floats, view: View) -> bool:
+    """Return True if a ray of one LiDAR ends at a `box` (7,) or beyond. A ray of the row below may
+    also end on the road before the box. A ray at the height of the box that ends too early rules
+    this out, since a wall may stand between.
     """
-    away = math.hypot(box[0], box[1])
+    x, y = box[0] - view.places[head, 0], box[1] - view.places[head, 1]
+    z, row_height = box[2] - view.places[head, 2], view.row_heights[head]
+    begin, end = view.firsts[head], view.firsts[head + 1]
+    away = math.hypot(x, y)
     near = away - max(box[3], box[4]) / 2
     wide = math.atan2(max(box[3], box[4]) / 2, away)
-    azimuth = math.atan2(box[1], box[0])
-    foot = math.atan2(box[2] - box[5] / 2, away)
+    azimuth = math.atan2(y, x)
+    foot = math.atan2(z - box[5] / 2, away)
     # If rows are farther apart than the box is high, the height of the box still has a row.
-    top = max(math.atan2(box[2] + box[5] / 2, away), foot + view.row_height)
+    top = max(math.atan2(z + box[5] / 2, away), foot + row_height)
     is_road_seen = is_hidden = False
     for turn in (-2 * math.pi, 0.0, 2 * math.pi):
-        first = np.searchsorted(view.azimuths, azimuth + turn - wide)
-        for place in range(first, len(view.azimuths)):
+        first = np.searchsorted(view.azimuths[begin:end], azimuth + turn - wide)
+        for place in range(begin + first, end):
             if view.azimuths[place] > azimuth + turn + wide:
                 break
             elevation = view.elevations[place]
             ends = farthest[view.cells[place]] * view.cosines[place]
-            if ends <= 0.0 or not foot - view.row_height <= elevation <= top:
+            if ends <= 0.0 or not foot - row_height <= elevation <= top:
                 continue
             is_far = ends >= min(view.roads[place], near) - SHORT_M
             if elevation >= foot and is_far:

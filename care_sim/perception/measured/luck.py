@@ -42,14 +42,35 @@ class Shares(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """The state of m objects."""
+    """The state of up to m objects in each of W worlds."""
 
     first: Integers
-    """(m,) the keyframe at which each is first annotated."""
+    """(W, m) the keyframe at which each is first annotated."""
     last: Integers
-    """(m, 8) the keyframe to which each signal is advanced, -1 before the first time."""
+    """(W, m, 8) the keyframe to which each signal is advanced, -1 before the first time."""
     processes: Floats
-    """(m, CHANNELS)"""
+    """(W, m, CHANNELS)"""
+    returns: Floats
+    """(W, m, k) the returns at the last k keyframes, each in the column of its keyframe modulo
+    k.
+    """
+    rows: Integers
+    """(W, m) the row of each present object in these tables."""
+    ranks: Integers
+    """(W, m) the place of each present object among them by ascending number."""
+
+    @classmethod
+    def of(cls, worlds: int, objects: int, keyframes: int) -> "Memory":
+        """Tables of objects that nobody has met."""
+        shape = worlds, objects
+        return cls(
+            np.zeros(shape, np.int64),
+            np.full((*shape, len(SIGNALS)), -1),
+            np.zeros((*shape, CHANNELS)),
+            np.zeros((*shape, keyframes)),
+            np.tile(np.arange(objects), (worlds, 1)),
+            np.tile(np.arange(objects), (worlds, 1)),
+        )
 
 
 def shares_of(luck: Luck, keyframe_s: float, flash_s: float) -> Shares:
@@ -64,33 +85,30 @@ def shares_of(luck: Luck, keyframe_s: float, flash_s: float) -> Shares:
 
 @compiled()
 def signal_of(
-    seed: np.uint64,
+    key: np.uint64,
     keyframe: int,
-    number: int,
-    row: int,
+    row: tuple[int, int],
     place: tuple[int, int],
     memory: Memory,
     shares: Shares,
 ) -> float:
-    """Return one of the `SIGNALS` of an object at a keyframe, a standard normal. `number` is the
-    object's, `row` its place in the `memory`, which is advanced. `place` is its class and the
-    signal.
+    """Return one of the `SIGNALS` of an object at a keyframe, a standard normal. `key` is the
+    object's, `row` its world and its row in the `memory`, which is advanced. `place` is its class
+    and the signal.
     """
     label, signal = place
-    own, constant = memory.processes[row], 2 * len(SIGNALS) + signal
-    key, slow = mixed(seed, number), 2 * signal
-    first = memory.last[row, signal] + 1
+    own, constant, slow = memory.processes[row], 2 * len(SIGNALS) + signal, 2 * signal
+    met, first = memory.first[row], memory.last[row][signal] + 1
     if first == 0:
         own[constant] = normal(mixed(key, _CONSTANT), slow)
-        first = memory.first[row]
+        first = met
     for step in range(first, keyframe + 1):
         now = mixed(key, step)
         for channel in (slow, slow + 1):
-            begins = step == memory.first[row]
-            kept = 0.0 if begins else shares.kept[label, channel]
-            fresh = 1.0 if begins else shares.fresh[label, channel]
+            kept = 0.0 if step == met else shares.kept[label, channel]
+            fresh = 1.0 if step == met else shares.fresh[label, channel]
             own[channel] = kept * own[channel] + fresh * normal(now, channel)
-    memory.last[row, signal] = keyframe
+    memory.last[row][signal] = keyframe
     weights = shares.weights[label, signal]
     total: float = weights[0] * own[constant] + weights[1] * own[slow] + weights[2] * own[slow + 1]
     return total

@@ -1,12 +1,16 @@
 """Reports of a measured detector at a keyframe, and the errors of boxes."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from care_sim.base.compiled import compiled
+from care_sim.base.hashing import mixed
 from care_sim.core.arrays import Floats, Integers
+from care_sim.perception.found import Found
 from care_sim.perception.matching import MATCH_M
+from care_sim.perception.measured.candidates import Kinds
 from care_sim.perception.measured.luck import (
     FIRST_ERROR,
     LUCK,
@@ -24,48 +28,64 @@ _WIDEST_M = MATCH_M * (1 - 1e-9)
 _RADIAL, _TANGENTIAL, _LENGTH, _WIDTH, _HEIGHT, _YAW = range(len(ERRORS))
 
 
+class Rules(NamedTuple):
+    """The fixed numbers of a detector on a rig."""
+
+    recall: Recall
+    shares: Shares
+    errors: Errors
+    kinds: Kinds
+    weights: Floats
+    """(k,) the weights of this keyframe's returns and of earlier ones, newest first."""
+    angles: Floats
+    """(h,) the weight of a return of each LiDAR."""
+    most: float
+    """Largest score that is reported."""
+    kept_ahead: float
+    """See `care_sim.perception.measured.tables.Measurement`."""
+    sensor_height_m: float
+    """Above the road."""
+
+
 @compiled()
 def report_objects(
+    w: int,
     clock: tuple[np.uint64, int],
-    present: tuple[Integers, Integers, Integers],
-    boxes: Floats,
-    returned: tuple[Integers, Integers, Integers, int],
-    heads: tuple[Integers, Floats],
+    present: tuple[Integers, Integers, Floats],
+    returned: tuple[Integers, Integers, int],
+    firsts: Integers,
     memory: Memory,
-    gathered: tuple[Floats, Floats],
-    tables: tuple[Recall, Shares, Errors],
-    bounds: tuple[float, float],
-) -> tuple[Integers, Floats, Floats, Integers]:
-    """Return the rows (k,) of the reported `present` objects, their boxes (k, 7) with errors,
-    scores (k,) within `bounds` and returns (k,).
+    rules: Rules,
+    found: Found,
+) -> None:
+    """Write into `found` what is reported of the `present` objects of a world `w`: their numbers
+    (n,), classes (n,), and boxes (n, 7), which get errors.
 
-    The `clock` holds the episode's seed and the keyframe. `present` are numbers, classes and rows
-    of memory (n,) of objects with `boxes` (n, 7). `returned` are the objects of all returns (P,),
-    the present ones in ascending order, the place of each in it, and the number of sweeps. The
-    bounds (h + 1,) in `heads` split the returns by LiDAR, and the angles (h,) weigh them.
-    `gathered` are returns (m, k) at the last keyframes, in the column of the keyframe modulo k, and
-    their weights (k,), newest first.
+    The `clock` holds the episode's seed and the keyframe. `returned` are the ascending cells and
+    the objects of all returns (P,), and the number of sweeps. `firsts` are those of a `View`.
     """
-    (seed, keyframe), (objects, classes, places) = clock, present
-    hits, ascending, ranks, sweeps = returned
-    (counts, weights), (table, shares, errors) = gathered, tables
-    by_rank, usual = np.zeros(len(ascending), np.int64), np.zeros(len(ascending))
-    for head, angle in enumerate(heads[1]):
-        own = count_hits(ascending, hits[heads[0][head] : heads[0][head + 1]])
+    (seed, keyframe), (objects, classes, boxes), (cells, hits, sweeps) = clock, present, returned
+    table, weights, ranks = rules.recall, rules.weights, memory.ranks[w]
+    ascending, by_rank = np.empty_like(objects), np.zeros(len(objects), np.int64)
+    for n in range(len(objects)):
+        ascending[ranks[n]] = objects[n]
+    usual = np.zeros(len(objects))
+    begin = 0
+    for head, angle in enumerate(rules.angles):
+        end = np.searchsorted(cells, firsts[head + 1])
+        own = count_hits(ascending, hits[begin:end])
         by_rank += own
         usual += angle * own
-    kept = len(weights)
-    counts[:, keyframe % kept] = 0.0
-    rows = np.empty(len(objects), np.int64)
-    seen, scores = np.empty((len(objects), 7)), np.empty(len(objects))
-    returns = np.empty(len(objects), np.int64)
+        begin = end
+    now_at = keyframe % len(weights)
+    memory.returns[w, :, now_at] = 0.0
     signals = np.empty(len(SIGNALS))
     count = 0
     for n in range(len(objects)):
-        label, place = classes[n], places[n]
+        label, row = classes[n], (w, memory.rows[w, n])
         now = usual[ranks[n]] / sweeps
-        counts[place, keyframe % kept] = now
-        average = now if sweeps > 1 else _average(counts[place], weights, keyframe)
+        memory.returns[row][now_at] = now
+        average = now if sweeps > 1 else _average(memory.returns[row], weights, keyframe)
         # Objects without returns are not reported, though the fitted curve has a share at 0.
         if not table.known[label] or now + average <= 0:
             continue
@@ -73,21 +93,28 @@ def report_objects(
         effective = effective_returns(
             now * worth, average * worth, table.fall[label], table.most[label]
         )
-        latent = latent_score(effective, label, table)
-        luck = signal_of(seed, keyframe, objects[n], place, (label, LUCK), memory, shares)
-        score = score_of(latent.mean + latent.spread * luck, label, table, bounds[1])
-        if score < bounds[0]:
+        latent, key = latent_score(effective, label, table), mixed(seed, objects[n])
+        luck = signal_of(key, keyframe, row, (label, LUCK), memory, rules.shares)
+        score = score_of(latent.mean + latent.spread * luck, label, table, rules.most)
+        if score < rules.kinds.least:
             continue
         for signal in range(TURNED, len(SIGNALS)):
-            own_place = label, signal
-            signals[signal] = signal_of(
-                seed, keyframe, objects[n], place, own_place, memory, shares
-            )
-        rows[count], scores[count], returns[count] = n, score, by_rank[ranks[n]]
-        seen[count] = boxes[n]
-        _misplace(seen[count], label, max(average * worth, 1.0), signals, errors)
+            signals[signal] = signal_of(key, keyframe, row, (label, signal), memory, rules.shares)
+        found.classes[w, count], found.objects[w, count] = label, objects[n]
+        found.scores[w, count], found.returns[w, count] = score, by_rank[ranks[n]]
+        box = found.boxes[w, count]
+        copy_box(boxes[n], box)
+        _misplace(box, label, max(average * worth, 1.0), signals, rules.errors)
         count += 1
-    return rows[:count], seen[:count], scores[:count], returns[:count]
+    found.counts[w] = count
+
+
+@compiled()
+def copy_box(box: Floats, into: Floats) -> None:
+    """Copy a box (7,)."""
+    # Faster than an assignment of slices.
+    for k in range(7):
+        into[k] = box[k]
 
 
 @compiled()
@@ -96,10 +123,12 @@ def _average(counts: Floats, weights: Floats, keyframe: int) -> float:
     gathers; detectors repeat the available ones.
     """
     total, weight = 0.0, 0.0
+    first = place = keyframe % len(weights)
     for age in range(min(len(weights), keyframe + 1)):
-        total += weights[age] * counts[(keyframe - age) % len(weights)]
+        total += weights[age] * counts[place]
         weight += weights[age]
-    return total / weight if weight > 0 else counts[keyframe % len(weights)]
+        place = place - 1 if place > 0 else len(weights) - 1
+    return total / weight if weight > 0 else counts[first]
 
 
 @compiled()

@@ -5,9 +5,9 @@ import pytest
 
 from care_sim.core.frames import Frame
 from care_sim.core.types import Detections
-from care_sim.loops.stages.detecting import Found
 from care_sim.loops.stages.state import State
 from care_sim.loops.stages.tracking import Tracking
+from care_sim.perception.found import Found
 from care_sim.perception.tracker import MemoryRules, TrackMemory
 
 DT = 0.1
@@ -29,14 +29,7 @@ def test_crowds_are_tracked_as_in_a_single_world(people, spread, line):
     classes = draw.integers(0, 2, (worlds, people))
     for _ in range(keyframes):
         boxes[:, :, :2] += draw.normal(size=(worlds, people, 2)) * (40 if people == 300 else 0.5)
-        empty = np.zeros((worlds, people), np.int64)
-        found = Found(
-            np.zeros(worlds, np.int64),
-            empty,
-            np.zeros((worlds, people, 7)),
-            empty.copy(),
-            empty.copy(),
-        )
+        found = Found.of(worlds, people)
         ids = {}
         for world in range(worlds):
             seen = np.flatnonzero(draw.random(people) < 0.8)

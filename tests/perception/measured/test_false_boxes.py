@@ -2,13 +2,12 @@
 
 import copy
 import pickle
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from care_sim.base.errors import InvalidInput
+from care_sim.base.threads import Threads
 from care_sim.core.cells.stack import GridStack
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
@@ -16,8 +15,9 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES
 from care_sim.loops.gathering import Gathering
 from care_sim.perception.detectors import make_detector
+from care_sim.perception.measured.candidates import SEEN
 from care_sim.perception.measured.tables import measurement
-from care_sim.sensors.annotated import NO_ANNOTATIONS, NO_OBJECT, Annotations, Cloud, joined
+from care_sim.sensors.annotated import NO_ANNOTATIONS, NO_OBJECT, Annotations, Cloud
 from care_sim.sensors.pictures import FRONT_CAMERA
 from tests.perception.measured.test_measured_detector import begun, rig
 
@@ -215,18 +215,30 @@ def test_a_copy_goes_on_as_the_original(copied):
     assert play(twin, 20) == play(detector, 20)
 
 
-def test_a_cloud_without_points_needs_ranges():
-    full = returns_of(ROAD_M)
-    pointless = replace(full, points=np.empty((0, 3)), ranges=ROAD_M[full.cells])
-    for cloud in (full, full.take(DIRECTIONS[full.cells, 1] > 0.3)):
-        bare = pointless if cloud is full else pointless.take(DIRECTIONS[full.cells, 1] > 0.3)
-        assert joined([bare]).ranges == pytest.approx(bare.ranges)
-        for (one, _, _), (other, _, _) in zip(
-            reported("megvii", 5, cloud=cloud), reported("megvii", 5, cloud=bare), strict=True
-        ):
-            assert one.tolist() == other.tolist()
-    with pytest.raises(InvalidInput, match=r"^a cloud must have a range per return: 0 of \d+$"):
-        list(reported("megvii", 1, cloud=replace(pointless, ranges=None)))
+def test_worlds_meet_what_each_meets_alone():
+    """Tables grow, at the first keyframe of one world after those of others."""
+    rules = make_detector("centerpoint", 1.84)
+    several, lone = (rules.worlds(n, rig(0.5), True, Threads(n)) for n in (3, 1))
+    rows = {}
+    for number in range(3):
+        several.begin(number, np.random.SeedSequence(number))
+    for keyframe in range(6):
+        live = np.array([True, keyframe < 4, keyframe > 2])
+        places = np.array([[100.0 * keyframe, 30.0], [5.0 * keyframe, 0.0], [0.0, 0.0]])
+        counts, tables, _ = several.advance(live, places)
+        for number in np.flatnonzero(live).tolist():
+            # Until a report no keyframe is over.
+            several._clock[1][number] += 1
+            rows[keyframe, number] = tables[number, : counts[number], :SEEN].tolist()
+    for number in range(3):
+        lone.begin(0, np.random.SeedSequence(number))
+        for keyframe in (k for k in range(6) if (k, number) in rows):
+            (count,), (table,), _ = lone.advance(
+                np.ones(1, np.bool_),
+                np.array([[[100.0 * keyframe, 30.0], [5.0 * keyframe, 0.0], [0.0, 0.0]][number]]),
+            )
+            lone._clock[1][0] += 1
+            assert table[:count, :SEEN].tolist() == rows[keyframe, number] != []
 
 
 def test_none_is_where_nobody_looks_nor_on_an_object_of_its_class_nor_near_ahead():
