@@ -15,7 +15,6 @@ from care_sim.base.checks import bounded, check_flag, one_of
 from care_sim.base.errors import InvalidInput
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats
-from care_sim.core.frames import Pose
 from care_sim.scenarios.base import LONGEST_EPISODE_S, Scenario
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.streets.draft import footprints_meet

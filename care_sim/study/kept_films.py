@@ -65,22 +65,17 @@ def _read(file: Path, key: bytes) -> Film | None:
     # Unpickling runs code: a damaged file, or one of other code, is not unpickled.
     if head != _head(key, packed):
         return None
-    film: Film = pickle.loads(zlib.decompress(packed))
-    bare = [shot.cloud for shot in film.shots]
-    points = [film.grid.points(cloud.cells, cloud.ranges) for cloud in bare]
-    pairs = zip(bare, points, strict=True)
-    return _with_clouds(film, [replace(one, points=own, ranges=None) for one, own in pairs])
+    film, ranges = pickle.loads(zlib.decompress(packed))
+    cells = [shot.cloud.cells for shot in film.shots]
+    return _with_points(film, map(film.grid.points, cells, ranges))
 
 
 def _keep(film: Film, file: Path, key: bytes) -> None:
     ranges = [_ranges(shot.cloud, film.grid) for shot in film.shots]
     if any(own is None for own in ranges):
         return
-    bare = [
-        replace(shot.cloud, points=NO_RETURNS.points, ranges=own)
-        for shot, own in zip(film.shots, ranges, strict=True)
-    ]
-    packed = zlib.compress(pickle.dumps(_with_clouds(film, bare)), level=1)
+    bare = _with_points(film, [NO_RETURNS.points] * len(ranges))
+    packed = zlib.compress(pickle.dumps((bare, ranges)), level=1)
     # Nothing may be written there, or another process writes the same.
     with suppress(OSError, InvalidInput), replacing(file) as unfinished:
         unfinished.write_bytes(_head(key, packed) + packed)
@@ -105,6 +100,9 @@ def _ranges(cloud: Cloud, grid: Grid) -> Floats | None:
     return None if len(wrong) else ranges
 
 
-def _with_clouds(film: Film, clouds: Iterable[Cloud]) -> Film:
-    shots = zip(film.shots, clouds, strict=True)
-    return replace(film, shots=tuple(replace(shot, cloud=cloud) for shot, cloud in shots))
+def _with_points(film: Film, points: Iterable[Floats]) -> Film:
+    shots = [
+        replace(shot, cloud=replace(shot.cloud, points=own))
+        for shot, own in zip(film.shots, points, strict=True)
+    ]
+    return replace(film, shots=tuple(shots))
