@@ -1,6 +1,6 @@
-"""What a film gives at each keyframe whatever fires: camera detections, motion and pose of the car.
+"""Inputs of each keyframe of a film that no fired cell changes: camera detections, motion and pose.
 
-All policies of a film meet the same, so it is drawn once for all of them.
+All policies of a film meet the same inputs, so these are drawn once for all of them.
 """
 
 from functools import lru_cache
