@@ -22,8 +22,8 @@ from care_sim.sensors.false_boxes import EMPTY_POOL
 
 
 class Given(NamedTuple):
-    """A keyframe before it fires: where the car takes its sensor to be, its own motion as its
-    odometry reads it, and the camera detections that have arrived, with the truth behind them.
+    """Inputs of a keyframe. `taken_for` is where the car takes its sensor to be. `ego` is its own
+    motion as its odometry reads it. `arrived` are the camera detections, with the truth behind them.
     """
 
     taken_for: Frame
