@@ -23,7 +23,7 @@ from care_sim.sensors.false_boxes import EMPTY_POOL
 
 class Given(NamedTuple):
     """Inputs of a keyframe. `taken_for` is where the car takes its sensor to be. `ego` is its own
-    motion as its odometry reads it. `arrived` are the camera detections, with the truth behind them.
+    motion as its odometry reads it. `arrived` are camera detections, with the truth behind them.
     """
 
     taken_for: Frame
