@@ -1,6 +1,6 @@
-"""What a film gives at each keyframe whatever fires: camera detections, motion and pose of the car.
+"""Inputs of each keyframe of a film that no fired cell changes: camera detections, motion and pose.
 
-All policies of a film meet the same, so it is drawn once for all of them.
+All policies of a film meet the same inputs, so these are drawn once for all of them.
 """
 
 from functools import lru_cache
@@ -22,8 +22,8 @@ from care_sim.sensors.false_boxes import EMPTY_POOL
 
 
 class Given(NamedTuple):
-    """A keyframe before it fires: where the car takes its sensor to be, its own motion as its
-    odometry reads it, and the camera detections that have arrived, with the truth behind them.
+    """Inputs of a keyframe. `taken_for` is where the car takes its sensor to be. `ego` is its own
+    motion as its odometry reads it. `arrived` are camera detections, with the truth behind them.
     """
 
     taken_for: Frame

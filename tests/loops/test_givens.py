@@ -1,4 +1,6 @@
-"""What a film gives whatever fires: drawn once for all policies, and anew for other conditions."""
+"""Inputs of a film that no fired cell changes are drawn once for all policies, and anew for other
+conditions.
+"""
 
 import numpy as np
 import pytest
