@@ -15,7 +15,6 @@ from care_sim.base.checks import bounded, check_flag, one_of
 from care_sim.base.errors import InvalidInput
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats
-from care_sim.core.frames import Pose
 from care_sim.scenarios.base import LONGEST_EPISODE_S, Scenario
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.streets.draft import footprints_meet
@@ -124,7 +123,7 @@ class _Ways:
         # Between two samples evenly, heading as at the first.
         steps = min(round(time / WORLD_STEP_S), _BETWEEN * (len(self._samples) - 1) - 1)
         sample, step = divmod(steps, _BETWEEN)
-        poses = self._samples[sample].copy()
+        poses: Floats = self._samples[sample].copy()
         poses[:, :2] += step / _BETWEEN * (self._samples[sample + 1, :, :2] - poses[:, :2])
         return poses
 
