@@ -123,7 +123,7 @@ class _Ways:
         # Between two samples evenly, heading as at the first.
         steps = min(round(time / WORLD_STEP_S), _BETWEEN * (len(self._samples) - 1) - 1)
         sample, step = divmod(steps, _BETWEEN)
-        poses = self._samples[sample].copy()
+        poses: Floats = self._samples[sample].copy()
         poses[:, :2] += step / _BETWEEN * (self._samples[sample + 1, :, :2] - poses[:, :2])
         return poses
 

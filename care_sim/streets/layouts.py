@@ -73,8 +73,8 @@ class Curve:
 
 
 def _turns(turns: Floats) -> Floats:
-    """Return (6, n) turns (n,) of a line since its start, the shares that their chords have of
-    their arcs, the cosines and sines of half of them, and of them.
+    """Return (6, n) the `turns` (n,) of a line since its start, and the ratios of chord to arc.
+    Then come cosine and sine of half of each turn, and of the turn.
     """
     # The chord of a circle's arc is 2 R sin(turn / 2) with the radius R = along / turn. NumPy's
     # sinc(x) is sin(pi x) / (pi x) and 1 at 0, where the road is straight and R infinite.

@@ -110,9 +110,9 @@ class Route:
 
 
 class _Legs(NamedTuple):
-    """All legs as rows: `starts` (legs, 3), `turns` (legs, 2) the cosine and sine that turn back by
-    their headings, `places` (legs, 3) what precedes them, their lengths and their curvatures, and
-    `middles` (legs, 2) in the world.
+    """All legs as rows. `starts` (legs, 3) are world poses, `middles` (legs, 2) world points.
+    `turns` (legs, 2) are the cosine and sine that turn back by their headings. `places` (legs, 3)
+    are the metres before each leg, its length and its curvature.
     """
 
     starts: Floats
