@@ -187,7 +187,7 @@ def _crossing(crosser: Crosser, one: Encounter, lane: DrivenLane) -> Crossing:
 
 def _look(crosser: Crosser, plan: SpeedPlan, line_m: float, world: World) -> None:
     """Let a crosser watch the ego, whose middle is on the line at `line_m` along the route."""
-    # No car is faster than its plan: nobody decides while it is too far away.
+    # Seconds are counted at planned speeds or less: nobody decides while the car is too far away.
     if line_m - world.along_m > plan.cruise_mps * (crosser.lead_s + LAST_BITS_S):
         return
     crosser.look(world.time, lambda: _seconds_left(world, plan, line_m))

@@ -190,11 +190,13 @@ class World:
         self._kinds[body] = kind
         actor = Actor(name, kind, body, pose_at, reported, pose)
         self.actors.append(actor)
+        if isinstance(pose, tuple):
+            return actor
         if isinstance(pose, Member):
             self._groups.setdefault(pose.poses_at, []).append((body, pose.number))
-        elif not isinstance(pose, tuple):
+        else:
             self._alone.append(actor)
-        alone = [actor.body for actor in self._alone]
+        alone = [one.body for one in self._alone]
         members = [np.array(rows).T for rows in self._groups.values()]
         self._moving = np.concatenate([[self.ego_body, *alone], *(bodies for bodies, _ in members)])
         self._numbers = [numbers for _, numbers in members]
