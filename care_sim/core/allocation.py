@@ -77,9 +77,9 @@ def fill_worlds(
     scores: NDArray[np.float32],
 ) -> None:
     """Replace what is scored in `scores` (W, N), the first `chosen_counts` (W,) cells of each row
-    of `chosen` (W, N), by what each world takes, in the worlds that are `live` (W,). Stage k of
-    world w has `counts[w, k]` sets and fills up to `limits[w, k]` cells in all; worlds follow each
-    other in every stage.
+    of `chosen` (W, N), by what each world takes. Worlds that are not `live` (W,) keep theirs. Stage
+    k of world w has `counts[w, k]` sets and fills up to `limits[w, k]` cells in all; worlds follow
+    each other in every stage.
     """
     sets = _offered(cells, sizes)
     taken = np.zeros(scores.shape[1], np.bool_)

@@ -29,8 +29,8 @@ LONGEST_LIVES = 20
 """Longest life in mean lives: one of 500 million candidates lasts longer."""
 LABEL, X, Y, SCORE, LAST, AHEAD, RANK, KIND, SEEN = 0, 1, 2, 8, 9, 10, 11, 12, 13
 """Columns of a table of candidates (n, 20): class, world box (7) without its height above the road,
-score, last keyframe, a uniform number, rank, row of `Kinds`, box (7) in the sensor frame. A
-candidate may be on the road ahead if the number is below `kept_ahead`.
+score, last keyframe, a uniform number, rank, row of `Kinds`. The last are the box (7) in the sensor
+frame. A candidate may be on the road ahead if the number is below `kept_ahead`.
 """
 COLUMNS = SEEN + 7
 

@@ -92,8 +92,8 @@ class MeasuredWorlds:
         sweeps: int = 1,
     ) -> Found:
         """Write what is reported of the `present` objects, and false boxes, into `found`, or into
-        longer tables, in the worlds that are `live` (W,). What was `returned` is that of all
-        `sweeps`. The `newest` one alone shows false boxes, since cells are in its sensor frame.
+        longer tables, in the worlds that are `live` (W,). All `sweeps` have `returned`
+        these. The `newest` one alone shows false boxes, since cells are in its sensor frame.
         """
         found = found.with_room(present[1].shape[1] + self._candidates.rows.shape[1])
         view = view_of(self._grid, self._rules.sensor_height_m)

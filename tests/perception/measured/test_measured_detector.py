@@ -127,7 +127,7 @@ def test_a_return_is_worth_what_the_solid_angle_of_its_own_lidar_says():
         for count in counts:
             hit = np.repeat(present.objects, count)
             cells = np.full(len(hit), first)
-            report, _ = detector.detect(Cloud(cells, np.empty((0, 3)), hit), present)
+            report, _ = detector.detect(Cloud(cells, np.ones((len(hit), 3)), hit), present)
         found = (report.scores >= 0.5).sum() / MANY
         assert found == pytest.approx(recall("centerpoint", "car", 1.25 * returns)[0], abs=0.03)
 
