@@ -1,16 +1,18 @@
 """Films of the published streets, kept in the user's cache folder for later runs.
 
 Making such a film takes thirty times as long as reading it. A file has 3 MB, those of the
-benchmark's streets a quarter of a gigabyte. Code, libraries and machine are part of the key: the
+benchmark's streets a quarter of a gigabyte. Code, libraries and processor are part of the key: the
 film of another maker is replaced.
 """
 
 import hashlib
 import pickle
+import platform
 import zlib
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -42,12 +44,18 @@ def kept_film(source: Source, scene: Scene, returns: FilmedReturns) -> Film:
         return source.film(scene, returns)
     setup = repr(sensor_setup(source.sensor)).encode()
     file = cache_folder("films") / f"{scene.name}-{hashlib.sha256(setup).hexdigest()[:8]}.film"
-    key = setup + repr([versions(), machine()]).encode()
+    key = setup + _maker()
     film = _read(file, key)
     if film is None:
         film = source.film(scene, returns)
         _keep(film, file, key)
     return film
+
+
+@cache
+def _maker() -> bytes:
+    """Return what decides the bits of a film besides its street and set-up."""
+    return repr([versions(), platform.system(), machine()["processor"]]).encode()
 
 
 def _is_published(scene: Scene) -> bool:

@@ -79,6 +79,7 @@ class Crosser:
     went: bool | None
     """Whether it set off; None before the decision."""
     lead_s: float
+    """Seconds before the ego's arrival at which it sets off."""
 
     def __init__(self, walk: Walk, lead_s: float, may_go: Callable[[Walk], bool]):
         self.walk = walk

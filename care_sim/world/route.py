@@ -127,7 +127,8 @@ def _on_straights(points: Floats, legs: _Legs) -> tuple[Floats, Floats, Integers
     the distances and before (n,) the legs. The last table (k, 2) holds points and bends that may be
     as near.
     """
-    squares, found = np.full(len(points), np.inf), np.empty((len(points), 3))
+    # A place that is no number, or too far to be squared, has no place on the line.
+    squares, found = np.full(len(points), np.inf), np.full((len(points), 3), np.nan)
     nearest = np.zeros(len(points), np.int64)
     near = np.empty((len(points) * len(legs.starts), 2), np.int64)
     count = 0

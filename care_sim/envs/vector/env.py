@@ -68,7 +68,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
     single: ClassVar[type[ClosedLoopEnv]]
     """The environment of which these are many."""
     thread_pool: Threads
-    """Threads that share the compiled work."""
+    """Threads that share the compiled work. A policy of this vector uses them too."""
 
     def __init__(
         self,
