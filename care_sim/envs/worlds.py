@@ -101,9 +101,9 @@ class Stepped(NamedTuple):
 
 
 class Worlds:
-    """A loop over a world for each of the `settings`, which differ at most in budget and camera. The
-    `choice` is that of their cells. Each world writes the observation of its coming keyframe into
-    its row of `observed`.
+    """A loop over a world for each of the `settings`, which differ at most in budget and camera.
+    The `choice` is that of their cells. Each world writes the observation of its coming keyframe
+    into its row of `observed`.
 
     Unless `exact`, clearances that no reward needs are bounds (`Loop`); outcomes are exact.
     Where all worlds fire equally many cells (`has_one_budget`), infos hold the cells as one array,
