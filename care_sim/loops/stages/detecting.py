@@ -10,7 +10,7 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.base.threads import Threads
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Integers, Mask, copy_row
 from care_sim.core.rig import Rig
 from care_sim.core.types import Scan
 from care_sim.loops.episode import SensorSeeds
@@ -137,13 +137,15 @@ class _OneDetector:
         with returns in a box count. Otherwise a box on the end of a lorry would find a person
         hidden behind it.
         """
-        detector, sensor = self._detector, state.sensors.frame(world)
+        detector, reported = self._detector, state.reported
         objects = self._named[np.minimum(bodies, len(self._named) - 2)]
         cloud = cloud_of(scan, objects, self._grid)
-        present = _present(state, world)
+        own = world, slice(reported.counts[world])
+        columns = reported.bodies[own], reported.classes[own], reported.boxes[own]
+        present = Annotations(*(column.copy() for column in columns))
         if self._gathering is not None:
             cloud = self._gathering.add(cloud, state.taken.frame(world))
-        detector.at(None, sensor)
+        detector.at(None, state.sensors.frame(world))
         detections, behind = detector.detect(cloud, present)
         if detector.track_score:
             sure = acted_on(detections, detector.track_score)
@@ -152,13 +154,6 @@ class _OneDetector:
         candidates = present.take((present.objects[:, None] == behind).any(axis=1))
         bodies = candidates.objects[found_objects(candidates, detections)]
         return detections.classes, detections.boxes, behind, bodies
-
-
-def _present(state: State, world: int) -> Annotations:
-    """The reported bodies of a world."""
-    counts, bodies, classes, boxes, _ = state.reported
-    own = world, slice(counts[world])
-    return Annotations(bodies[own].copy(), classes[own].copy(), boxes[own].copy())
 
 
 @compiled(brief=True)
@@ -183,8 +178,7 @@ def _detect(
             if hits[row] >= least:
                 found.classes[w, count] = reported.classes[w, row]
                 found.objects[w, count] = known[row]
-                for k in range(7):
-                    found.boxes[w, count, k] = reported.boxes[w, row, k]
+                copy_row(reported.boxes[w, row], found.boxes[w, count])
                 count += 1
         found.counts[w] = count
 
