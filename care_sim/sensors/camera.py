@@ -85,7 +85,7 @@ class CameraDetectors:
         self._is_late = bool(latencies.any() or jitters.any())
         self._is_ever_dark = any(each.blackout_s for each in sensing)
         errors = [(one.camera_rotation_sigma_deg, one.camera_position_sigma_m) for one in sensing]
-        self.errs = np.array(errors).any(axis=1)
+        self.errs = np.array([any(one) for one in errors])
         """(W,) where the cameras are not mounted as designed."""
         self.mounted = [self._designed] * worlds
         """(W,) the cameras as mounted, errors included."""

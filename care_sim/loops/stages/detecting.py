@@ -137,15 +137,13 @@ class _OneDetector:
         with returns in a box count. Otherwise a box on the end of a lorry would find a person
         hidden behind it.
         """
-        detector, reported = self._detector, state.reported
+        detector, sensor = self._detector, state.sensors.frame(world)
         objects = self._named[np.minimum(bodies, len(self._named) - 2)]
         cloud = cloud_of(scan, objects, self._grid)
-        own = world, slice(reported.counts[world])
-        columns = reported.bodies[own], reported.classes[own], reported.boxes[own]
-        present = Annotations(*(column.copy() for column in columns))
+        present = _present(state, world)
         if self._gathering is not None:
             cloud = self._gathering.add(cloud, state.taken.frame(world))
-        detector.at(None, state.sensors.frame(world))
+        detector.at(None, sensor)
         detections, behind = detector.detect(cloud, present)
         if detector.track_score:
             sure = acted_on(detections, detector.track_score)
@@ -154,6 +152,13 @@ class _OneDetector:
         candidates = present.take((present.objects[:, None] == behind).any(axis=1))
         bodies = candidates.objects[found_objects(candidates, detections)]
         return detections.classes, detections.boxes, behind, bodies
+
+
+def _present(state: State, world: int) -> Annotations:
+    """The reported bodies of a world."""
+    counts, bodies, classes, boxes, _ = state.reported
+    own = world, slice(counts[world])
+    return Annotations(bodies[own].copy(), classes[own].copy(), boxes[own].copy())
 
 
 @compiled(brief=True)

@@ -64,8 +64,13 @@ def view_of(grid: Grid, sensor_height_m: float) -> View:
         order = np.argsort(azimuths)
         own = azimuths, elevations, np.cos(elevations), roads
         columns.append([head.first + order, *(column[order] for column in own)])
+    cells, azimuths, elevations, cosines, roads = map(np.concatenate, zip(*columns, strict=True))
     return View(
-        *map(np.concatenate, zip(*columns, strict=True)),
+        cells,
+        azimuths,
+        elevations,
+        cosines,
+        roads,
         np.array([*(head.first for head in grid.heads), grid.size]),
         np.array([head.place for head in grid.heads], float),
         np.array([head.grid.row_height for head in grid.heads], float),
