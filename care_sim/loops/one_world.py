@@ -25,7 +25,7 @@ from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.engines import make_engine
 from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
 from care_sim.sensors.lidar import Lidar
-from care_sim.sensors.pictures import class_table, faultless_detections
+from care_sim.sensors.pictures import faultless_detections
 from care_sim.world.world import World
 
 _HERE = np.ones(1, np.bool_)
@@ -181,7 +181,7 @@ class OneWorld:
         labels, engine = world.labels(), self._loop.conditions.engine
         boxes = self._local_boxes(np.array([*labels], np.int64))
         drawn = make_engine(engine, world.bullet, self.rig.grid), taken, self.sensor, boxes
-        return faultless_detections(photographed(*drawn), class_table(labels))
+        return faultless_detections(photographed(*drawn), labels)
 
     @property
     def mounted(self) -> tuple[PinholeCamera, ...]:

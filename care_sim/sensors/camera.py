@@ -3,21 +3,19 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.base.threads import ALONE, Threads
 from care_sim.base.times import LAST_BITS_S
-from care_sim.core.arrays import Floats, Integers, Mask, filled
-from care_sim.core.cells.boxes import planar_ranges
+from care_sim.core.arrays import Floats, Integers, Mask, copy_row, filled
 from care_sim.core.conditions import KITTI_CAMERA, YOLOX_CAMERA, CameraFaults, Sensing
 from care_sim.core.pinhole import PinholeCamera, mounted_cameras
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import NO_OBJECT, IdentifiedDetections
 from care_sim.sensors.camera_errors import ProfiledDetector
-from care_sim.sensors.camera_faults import Delay, Detected, Misses
+from care_sim.sensors.camera_faults import Delay, Detected, Misses, place_of
 from care_sim.sensors.camera_profiles import YOLOX
 from care_sim.sensors.false_boxes import EMPTY_POOL, NO_ROWS, BoxPool, FalseBoxes
 from care_sim.sensors.kitti.detector import KittiDetectors
@@ -28,27 +26,19 @@ _AGE, _CAMERA = ImageDetections.AGE, ImageDetections.CAMERA
 _CONFIDENCE = ImageDetections.CONFIDENCE
 
 
-class PictureTiming(NamedTuple):
-    """When pictures are taken and arrive. Each keyframe has a picture, taken `after_s` seconds
-    later. Its detections arrive `keyframes` keyframes later.
-    """
-
-    keyframes: int
-    after_s: float
-
-
-def picture_timing(faults: CameraFaults, keyframe_s: float, step_s: float) -> PictureTiming:
-    """Return the timing that `faults` set. Pictures can be taken every `step_s` seconds; a keyframe
-    of `keyframe_s` is a whole number of steps. The newest picture that is at least as old as a
-    latency in seconds is used.
+def picture_timing(faults: CameraFaults, keyframe_s: float, step_s: float) -> tuple[int, float]:
+    """Return how many keyframes later a keyframe's detections arrive, and how many seconds after
+    the keyframe its picture is taken. Pictures can be taken every `step_s` seconds; a keyframe of
+    `keyframe_s` is a whole number of steps. The newest picture that is at least as old as a latency
+    in seconds is used.
     """
     if not faults.camera_latency_s:
-        return PictureTiming(faults.camera_latency, 0.0)
+        return faults.camera_latency, 0.0
     # Rounded up to steps; they are counted back from the keyframe at which the detections arrive.
     steps = math.ceil((faults.camera_latency_s - LAST_BITS_S) / step_s)
     per_keyframe = round(keyframe_s / step_s)
     keyframes = -(-steps // per_keyframe)
-    return PictureTiming(keyframes, (keyframes * per_keyframe - steps) * step_s)
+    return keyframes, (keyframes * per_keyframe - steps) * step_s
 
 
 NOTHING_SEEN = IdentifiedDetections(
@@ -88,13 +78,15 @@ class CameraDetectors:
         self._least = np.array([float(each.camera_confidence) for each in sensing])
         self._misses = Misses(sensing)
         timings = [picture_timing(each, keyframe_s, step_s or keyframe_s) for each in sensing]
-        self.after_s = np.array([each.after_s for each in timings])
+        latencies, self.after_s = map(np.array, zip(*timings, strict=True))
         """(W,) seconds from a keyframe to the pictures that it takes."""
-        latencies = np.array([each.keyframes for each in timings])
         jitters = np.array([each.camera_jitter for each in sensing])
         self._delay = Delay(latencies, jitters, keyframe_s, self.after_s)
         self._is_late = bool(latencies.any() or jitters.any())
         self._is_ever_dark = any(each.blackout_s for each in sensing)
+        errors = [(one.camera_rotation_sigma_deg, one.camera_position_sigma_m) for one in sensing]
+        self.errs = np.array([any(one) for one in errors])
+        """(W,) where the cameras are not mounted as designed."""
         self.mounted = [self._designed] * worlds
         """(W,) the cameras as mounted, errors included."""
         self.cameras = mounted_cameras(worlds, cameras)
@@ -129,7 +121,7 @@ class CameraDetectors:
             rng = np.random.default_rng(own[0])
             made = FalseBoxes(pool, sensing.false_positive_rate, len(cameras), rng)
             self._false_boxes[world] = made
-        if sensing.camera_rotation_sigma_deg or sensing.camera_position_sigma_m:
+        if self.errs[world]:
             rng = np.random.default_rng(own[2])
             cameras = tuple(mounted(camera, sensing, rng) for camera in cameras)
             self.mounted[world] = cameras
@@ -160,10 +152,7 @@ class CameraDetectors:
         # same faults.
         visible = np.empty((len(live), 0)) if visible is None else visible
         pictures = np.empty((len(live), 0, 2)) if pictures is None else pictures
-        missed = np.zeros((len(live), 0), np.bool_)
-        if self._misses.any:
-            ranges = planar_ranges(boxes.reshape(-1, 7)).reshape(boxes.shape[:2])
-            missed = self._misses.draw(live, ranges)
+        missed = self._misses.draw(live, np.hypot(boxes[..., 0], boxes[..., 1]))
         # How many of each world's detections, the last ones, are false.
         false = np.zeros(len(live), np.int64)
         for world in np.flatnonzero(live).tolist():
@@ -246,19 +235,11 @@ def _sort_out(
         # In the dark nothing is reported, false boxes included; delays go on.
         for n in range(0 if dark[w] else seen.counts[w]):
             is_sure = seen.rows[w, n, _CONFIDENCE] >= least[w]
-            if is_sure and (n >= true or not _is_missed(seen.objects[w, n], w, missed, known)):
+            place = place_of(seen.objects[w, n], known[1][w, : known[0][w]]) if n < true else -1
+            if is_sure and not (0 <= place < missed.shape[1] and missed[w, place]):
                 _sort_in(seen, w, n, count, false[w] > 0)
                 count += 1
         seen.counts[w] = count
-
-
-@compiled(brief=True)
-def _is_missed(body: int, world: int, missed: Mask, known: tuple[Integers, Integers]) -> bool:
-    """Whether an object of a world is missed; see `_sort_out`."""
-    for place in range(min(known[0][world], missed.shape[1])):
-        if missed[world, place] and known[1][world, place] == body:
-            return True
-    return False
 
 
 @compiled(brief=True)
@@ -270,12 +251,10 @@ def _sort_in(seen: Detected, world: int, n: int, place: int, has_false: bool) ->
     row, body = rows[n].copy(), objects[n]
     while place > 0 and comes_before(row, rows[place - 1], has_false):
         objects[place] = objects[place - 1]
-        for k in range(len(row)):
-            rows[place, k] = rows[place - 1, k]
+        copy_row(rows[place - 1], rows[place])
         place -= 1
     objects[place] = body
-    for k in range(len(row)):
-        rows[place, k] = row[k]
+    copy_row(row, rows[place])
 
 
 _HERE = np.ones(1, np.bool_)

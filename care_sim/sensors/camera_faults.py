@@ -46,6 +46,15 @@ class Detected(NamedTuple):
         return IdentifiedDetections(detections, self.objects[world, own].copy())
 
 
+@compiled(brief=True)
+def place_of(body: int, objects: Integers) -> int:
+    """Return the place of a body among `objects` (n,), -1 if it is none of them."""
+    for place in range(len(objects)):
+        if objects[place] == body:
+            return place
+    return -1
+
+
 class Misses:
     """Draws which objects the cameras miss. The long-run share is as stated; misses last for bursts
     of keyframes. Each object takes one draw per keyframe, seen or not, so that every policy meets
@@ -61,12 +70,11 @@ class Misses:
         # Keyframes for which each object's burst still lasts.
         self._lasting = np.zeros((worlds, 0), np.int64)
         self._started = np.zeros(worlds, np.bool_)
-        self.any = bool(self._shares.any())
-        """Whether any are ever missed."""
+        self._is_any = bool(self._shares.any())
 
     def begin(self, world: int, seed: np.random.SeedSequence, objects: int) -> None:
         """Begin an episode with so many `objects` that can be missed."""
-        if self.any:
+        if self._is_any:
             rng = np.random.default_rng(seed)
             self._draws.begin(world, partial(_uniform, rng, objects))
             self._started[world] = False
@@ -75,7 +83,7 @@ class Misses:
         """Return (W, R) which objects are missed at this keyframe of the `live` worlds. `ranges`
         (W, R) are metres.
         """
-        if not self.any:
+        if not self._is_any:
             return np.zeros(ranges.shape, np.bool_)
         width = ranges.shape[1]
         lasting = self._lasting

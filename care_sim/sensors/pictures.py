@@ -20,11 +20,7 @@ CAMERA_FROM_LIDAR = (0.76, 0.0, -0.33)
 
 
 CAMERA_HEIGHT = 180
-
-
 CAMERA_WIDTH = 320
-
-
 FRONT_CAMERA = PinholeCamera(CAMERA_WIDTH, CAMERA_HEIGHT, np.deg2rad(90.0), CAMERA_FROM_LIDAR)
 """90 degrees wide, the default of CARLA's RGB camera, in which the paper ran."""
 
@@ -54,41 +50,34 @@ def pixels_of(confidences: Floats) -> Floats:
     return FULL_CONFIDENCE * confidences / np.maximum(1 - confidences, 1e-12)
 
 
-def is_shown(table: Integers, body: int) -> bool:
-    """Whether a picture, as a table of boxes, shows enough of a body for a box."""
-    return bool(((table[:, 0] == body) & (table[:, 5] >= MIN_PIXELS)).any())
-
-
-def class_table(labels: Mapping[int, int]) -> Integers:
-    """The class of every body by its id, -1 of those that `labels` does not map to one."""
-    table = np.full(max(labels, default=-1) + 1, -1)
-    table[list(labels)] = list(labels.values())
-    return table
-
-
-def faultless_detections(tables: Sequence[Integers], classes: Integers) -> IdentifiedDetections:
-    """Return the faultless detections: a box for every body that has a class in the `class_table`
-    and shows enough pixels. `tables` of boxes are one per camera of the rig, in its order.
+def faultless_detections(
+    tables: Sequence[Integers], labels: Mapping[int, int]
+) -> IdentifiedDetections:
+    """Return the faultless detections: a box for every body that has a class in `labels` and shows
+    enough pixels. `tables` of boxes are one per camera of the rig, in its order.
     """
-    parts = [reported_boxes(table, classes, camera) for camera, table in enumerate(tables)]
-    rows = np.concatenate([np.empty((0, _COLUMNS)), *(rows for rows, _ in parts)])
-    bodies = np.concatenate([np.empty(0, np.int64), *(bodies for _, bodies in parts)])
-    return IdentifiedDetections(ImageDetections.from_checked_rows(rows), bodies)
+    classes = np.full(max(labels, default=-1) + 1, -1)
+    classes[list(labels)] = list(labels.values())
+    most, count = sum(map(len, tables)), 0
+    rows, bodies = np.zeros((most, _COLUMNS)), np.zeros(most, np.int64)
+    for camera, table in enumerate(tables):
+        count = add_reported(table, classes, camera, rows, bodies, count)
+    return IdentifiedDetections(ImageDetections.from_checked_rows(rows[:count]), bodies[:count])
 
 
 @compiled()
-def reported_boxes(table: Integers, classes: Integers, camera: int) -> tuple[Floats, Integers]:
-    """The detections (k, 9), in the order of `ImageDetections.COLUMNS`, of those bodies in a table
-    of boxes that have a class and show enough pixels, and their ids (k,). `classes` by body id, -1
-    without one.
+def add_reported(
+    table: Integers, classes: Integers, camera: int, rows: Floats, ids: Integers, count: int
+) -> int:
+    """Add the detections of those bodies in a table of boxes that have a class and show enough
+    pixels to `rows` (D, 9), in the order of `ImageDetections.COLUMNS`, and to their `ids` (D,), of
+    which there are `count`; return how many there are then. `classes` by body id, -1 without one.
     """
-    rows = np.zeros((len(table), _COLUMNS))
-    ids = np.empty(len(table), np.int64)
-    count = 0
     for n in range(len(table)):
         body, pixels = table[n, 0], table[n, 5]
         if 0 <= body < len(classes) and classes[body] >= 0 and pixels >= MIN_PIXELS:
             one = rows[count]
+            one[:] = 0.0
             one[_CLASS] = classes[body]
             # As `confidence_of` has it.
             one[_CONFIDENCE] = pixels / (pixels + FULL_CONFIDENCE)
@@ -97,7 +86,7 @@ def reported_boxes(table: Integers, classes: Integers, camera: int) -> tuple[Flo
             one[_CAMERA] = camera
             ids[count] = body
             count += 1
-    return rows[:count], ids[:count]
+    return count
 
 
 @compiled()

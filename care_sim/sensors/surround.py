@@ -21,7 +21,6 @@ from care_sim.sensors.pictures import (
     CAMERA_FROM_LIDAR,
     CAMERA_HEIGHT,
     CAMERA_WIDTH,
-    class_table,
     faultless_detections,
 )
 from care_sim.world.bullet import NO_BODY, BulletWorld, PixelWindow
@@ -75,7 +74,7 @@ def surround_detections(
     for view in views:
         window = view.window_on(view.sensor.boxes_of(sensor, boxes))
         tables.append(engine.visible_boxes(view.camera, view.sensor, window))
-    return faultless_detections(tables, class_table(labels))
+    return faultless_detections(tables, labels)
 
 
 def full_sweep(

@@ -7,7 +7,7 @@ from collections import Counter, defaultdict
 import numpy as np
 
 from care_sim.sensors.kitti.beside import PAIRS
-from care_sim.sensors.kitti.detector import Draws, report
+from care_sim.sensors.kitti.detector import report
 from care_sim.sensors.kitti.draws import PersistentNormals, Renewals, key_of
 from care_sim.sensors.kitti.invented import MOST, Chance
 from tests.helpers.kitti_object import FOLDER, PICTURE, Pictures, as_labels, matched, overlaps
@@ -67,9 +67,9 @@ def played(name, measured, seed):
     labels, rows = as_labels(told)
     places = np.unique(tracks[rows], return_inverse=True)[1]
     rng, times, objects = np.random.default_rng(seed), measured.times, places.max() + 1
-    luck = PersistentNormals(1, [0.0], [times.luck_share], [times.luck_s], SECONDS)
-    errors = [times.edges_lasting] * 4, [times.edges_share] * 4, [times.edges_s] * 4
-    edges = PersistentNormals(1, *errors, SECONDS)
+    luck = PersistentNormals(1, 1, 0.0, times.luck_share, times.luck_s, SECONDS)
+    of_edges = times.edges_lasting, times.edges_share, times.edges_s
+    edges = PersistentNormals(1, 4, *of_edges, SECONDS)
     beside = Renewals(1, PAIRS * MOST, times.false_s, SECONDS)
     scene = Renewals(1, 3 * MOST, times.false_s, SECONDS)
     for draws, stream in zip((luck, edges, beside, scene), rng.spawn(4), strict=True):
@@ -83,10 +83,10 @@ def played(name, measured, seed):
         shown = shown._replace(cameras=np.zeros(own.sum(), np.int64), places=places[own])
         now = np.uint64(key_of(key, frame, 0, 0))
         began, scenes = beside.next(HERE)[0, :objects], scene.next(HERE)[0, :1]
-        false = Chance(false_key, now, began, scenes)
         own_luck = np.ascontiguousarray(luck.next(HERE)[0, :objects, 0])
-        draws = Draws(own_luck, edges.next(HERE)[0, :objects], now, false)
-        made, _ = report(shown, PICTURE[None], nothing, draws, measured.numbers)
+        errors = edges.next(HERE)[0, :objects]
+        chance = Chance(false_key, now, own_luck, errors, began, scenes)
+        made, _ = report(shown, PICTURE[None], nothing, chance, measured.numbers)
         frames = np.full(len(made.scores), frame)
         parts.append(np.column_stack([made.classes, made.scores, np.trunc(made.edges), frames]))
     return told._replace(found=np.concatenate(parts))

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from care_sim.core.types import CLASSES
 from care_sim.sensors.kitti.beside import PAIRS
-from care_sim.sensors.kitti.detector import Draws, report
+from care_sim.sensors.kitti.detector import report
 from care_sim.sensors.kitti.invented import MOST, Chance
 from care_sim.sensors.kitti.labels import KINDS, Labels, covered
 
@@ -121,19 +121,16 @@ def simulated(told, numbers, seed):
     """(m, 7) what the simulated detector reports of the pictures: class, score, edges, picture."""
     labels, _ = as_labels(told)
     rng = np.random.default_rng(seed)
-    false = Chance(
+    chance = Chance(
         *rng.integers(2**63, size=2).astype(np.uint64),
+        rng.standard_normal(len(labels.kinds)),
+        rng.standard_normal((len(labels.kinds), 4)),
         np.zeros((len(labels.kinds), PAIRS * MOST), np.int64),
         np.zeros((told.count, 3 * MOST), np.int64),
     )
-    luck, edges = (
-        rng.standard_normal(len(labels.kinds)),
-        rng.standard_normal((len(labels.kinds), 4)),
-    )
-    draws = Draws(luck, edges, np.uint64(rng.integers(2**63)), false)
     nothing = np.empty(0, np.int64), np.empty((0, 4)), np.empty(0, np.int64)
     pictures = np.tile(PICTURE, (told.count, 1))
-    boxes, shown_in = report(labels, pictures, nothing, draws, numbers)
+    boxes, shown_in = report(labels, pictures, nothing, chance, numbers)
     return np.column_stack([boxes.classes, boxes.scores, np.trunc(boxes.edges), shown_in])
 
 

@@ -13,7 +13,7 @@ from care_sim.core.grid import AngularGrid
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.scenarios import make_scenario
 from care_sim.sensors.engines.picture_kernels import visible_boxes
-from care_sim.sensors.pictures import FRONT_CAMERA, MIN_PIXELS, is_shown
+from care_sim.sensors.pictures import FRONT_CAMERA, MIN_PIXELS
 
 GRID = AngularGrid()
 KEYFRAME = 0.1
@@ -55,12 +55,13 @@ def sight(world):
     _, ids = world.bullet.cast(sensor.origin, GRID.directions[hull] @ heading.T, GRID.range_m)
     picture = visible_boxes(world.bullet.body_ids(FRONT_CAMERA, sensor))
     others = [other for other in world.actors if other.label is not None and other is not actor]
+    shown = picture[picture[:, 5] >= MIN_PIXELS, 0]
     pixels = int(picture[picture[:, 0] == actor.body, 5].sum())
     passage = world.advance(0.0, KEYFRAME)
     return Sight(
         int(np.sum(ids == actor.body)),
         pixels,
-        sum(is_shown(picture, other.body) for other in others),
+        int(np.isin([other.body for other in others], shown).sum()),
         float(box[0, 0]),
         passage.clearance_m,
         passage.impact_speed_mps is not None,

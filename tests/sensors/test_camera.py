@@ -13,21 +13,15 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import CameraFaults, Conditions, Sensing
 from care_sim.core.frames import Frame
 from care_sim.core.types import CLASSES
-from care_sim.sensors.camera import (
-    CameraDetector,
-    mounted,
-    picture_timing,
-)
+from care_sim.sensors.camera import CameraDetector, mounted, picture_timing
 from care_sim.sensors.camera_faults import Delay, Detected, Misses
 from care_sim.sensors.engines.picture_kernels import visible_boxes
 from care_sim.sensors.pictures import (
     FRONT_CAMERA,
     FULL_CONFIDENCE,
     MIN_PIXELS,
-    class_table,
     confidence_of,
     faultless_detections,
-    is_shown,
 )
 from care_sim.world.bodies import CATALOGUE
 
@@ -45,7 +39,7 @@ class Detector(CameraDetector):
 
     def detect(self, picture, heading):
         self.frame += 1
-        seen = faultless_detections([picture], class_table(self.labels))
+        seen = faultless_detections([picture], self.labels)
         time_s = self.frame * self.keyframe_s
         return super().detect(seen, heading, self.boxes, time_s).detections
 
@@ -70,7 +64,6 @@ def test_boxes_are_the_outer_edges_of_the_visible_pixels():
 @pytest.mark.parametrize(("pixels", "visible"), [(MIN_PIXELS - 1, False), (MIN_PIXELS, True)])
 def test_a_sliver_has_no_box(pixels, visible):
     seen = picture((3, 0, 0, pixels, 1))
-    assert is_shown(seen, 3) is visible
     assert len(detector({3: 0}).detect(seen, 0.0)) == int(visible)
 
 

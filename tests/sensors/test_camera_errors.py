@@ -30,7 +30,7 @@ from care_sim.sensors.camera_errors import (
 from care_sim.sensors.camera_profiles import YOLOX, RecallTable
 from care_sim.sensors.engines.picture_kernels import visible_boxes
 from care_sim.sensors.false_boxes import NO_ROWS, BoxPool, box_areas
-from care_sim.sensors.pictures import FRONT_CAMERA, class_table, faultless_detections
+from care_sim.sensors.pictures import FRONT_CAMERA, faultless_detections
 from care_sim.world.bodies import CATALOGUE
 
 SPREADS = (0.1, 0.02, 0.15, 0.05)
@@ -142,7 +142,7 @@ def ratio_from_all_sides(bullet, kind):
         bullet.move_all(np.array([body]), np.array([(metres, 2.0, yaw)]))
         local = SENSOR.boxes_to_local(np.array([[metres, 2.0, size[2] / 2, *size, yaw]]))
         picture = visible_boxes(bullet.body_ids(FRONT_CAMERA, SENSOR))
-        seen = faultless_detections([picture], class_table({body: label})).detections
+        seen = faultless_detections([picture], {body: label}).detections
         ratios += (box_areas(seen.boxes) / box_areas(whole_boxes(FRONT_CAMERA, local))).tolist()
     bullet.move_all(np.array([body]), np.array([(-99.0, 0.0, 0.0)]))
     return ratios

@@ -10,7 +10,7 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.base.threads import Threads
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Integers, Mask, copy_row
 from care_sim.core.rig import Rig
 from care_sim.core.types import Scan
 from care_sim.loops.episode import SensorSeeds
@@ -183,8 +183,7 @@ def _detect(
             if hits[row] >= least:
                 found.classes[w, count] = reported.classes[w, row]
                 found.objects[w, count] = known[row]
-                for k in range(7):
-                    found.boxes[w, count, k] = reported.boxes[w, row, k]
+                copy_row(reported.boxes[w, row], found.boxes[w, count])
                 count += 1
         found.counts[w] = count
 

@@ -5,14 +5,12 @@ detectors report what is in them (`care_sim.sensors.camera`).
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
 from care_sim.base.threads import Threads
-from care_sim.core.arrays import Floats, Integers, Mask, longer
+from care_sim.core.arrays import Floats, Integers, Mask, copy_row, longer
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Frame, turned_alike
 from care_sim.core.pinhole import (
@@ -29,31 +27,18 @@ from care_sim.sensors.camera import CameraDetectors
 from care_sim.sensors.camera_faults import Detected
 from care_sim.sensors.engines import Engine, make_engine
 from care_sim.sensors.engines.picture_kernels import Line, draw_silhouettes, empty_line
-from care_sim.sensors.engines.silhouette_kernels import (
-    Silhouettes,
-    lay_silhouettes,
-    room_for,
-)
+from care_sim.sensors.engines.silhouette_kernels import Silhouettes, lay_silhouettes, room_for
 from care_sim.sensors.engines.view_kernels import Lens, Meshes, PlacedCamera
 from care_sim.sensors.false_boxes import BoxPool
-from care_sim.sensors.pictures import (
-    MIN_PIXELS,
-    class_table,
-    faultless_detections,
-    reported_boxes,
-)
+from care_sim.sensors.pictures import MIN_PIXELS, add_reported, faultless_detections
 from care_sim.world.bullet import FAR_M, NO_BODY
 from care_sim.world.world import WORLD_STEP_S, World
 
 _DEPTHS = (NEAR_M, FAR_M)
 
 
-class _Room(NamedTuple):
-    """Room that one picture after the other is drawn in; `found` (B, 6) is its table of boxes."""
-
-    seen: Silhouettes
-    line: Line
-    found: Integers
+_Room = tuple[Silhouettes, Line, Integers]
+"""Room that one picture after the other is drawn in. The last is its table of boxes (B, 6)."""
 
 
 class Seeing:
@@ -75,12 +60,6 @@ class Seeing:
         self.after_steps: Integers = np.rint(self.detectors.after_s / WORLD_STEP_S).astype(np.int64)
         """(W,) world steps from a keyframe to the pictures that it takes."""
         self._designed = mounted_cameras(worlds, rig.cameras)
-        self._errs = np.array(
-            [
-                bool(one.camera_rotation_sigma_deg or one.camera_position_sigma_m)
-                for one in conditions
-            ]
-        )
         self._built: list[World | None] = [None] * worlds
         # Bodies of whom somebody asks at every keyframe, whether a camera shows them.
         self._asked = np.full((worlds, 1), NO_BODY)
@@ -143,7 +122,7 @@ class Seeing:
 
     def _take(self, state: State, due: Mask, seen: Detected | None = None) -> None:
         """Hand the detectors their pictures; `seen` is what cameras show where no mount errs."""
-        drawn = due if seen is None else due & self._errs
+        drawn = due if seen is None else due & self.detectors.errs
         if seen is None or drawn.any():
             seen = self._drawn(state, drawn, True, seen)
         headings, boxes = state.taken.poses[:, 3], state.reported.boxes
@@ -174,10 +153,9 @@ class Seeing:
             engine = make_engine(self._engine, built.bullet, self._rig.grid)
             boxes = reported.boxes[world, : reported.counts[world]].copy()
             drawn = photographed(engine, made, state.sensors.frame(world), boxes)
-            shown[world, [row[0] for table in drawn for row in table if row[5] >= MIN_PIXELS]] = (
-                True
-            )
-            seen = seen.put(world, faultless_detections(drawn, class_table(built.labels())))
+            large = [row[0] for table in drawn for row in table if row[5] >= MIN_PIXELS]
+            shown[world, large] = True
+            seen = seen.put(world, faultless_detections(drawn, built.labels()))
         return seen
 
 
@@ -191,33 +169,16 @@ def photographed(
 
 
 @compiled(brief=True)
-def _copy_rows(rows: Floats, into: Floats) -> None:
-    """Copy `rows` (n, k) to the first n rows of `into` (m, k).
-
-    An assignment of slices does the same, but Numba compiles the text of its error along, which
-    takes seconds.
-    """
-    for n in range(rows.shape[0]):
-        for k in range(rows.shape[1]):
-            into[n, k] = rows[n, k]
-
-
-@compiled(brief=True)
-def _copy(numbers: NDArray[Any], into: NDArray[Any]) -> None:
-    """Copy `numbers` (n,) to the first n of `into`, as `_copy_rows` does."""
-    for n in range(len(numbers)):
-        into[n] = numbers[n]
-
-
-@compiled(brief=True)
 def _see_boxes(live: Mask, sensors: Sensors, bodies: Bodies, reported: Reported) -> None:
     """Fill the boxes of the reported bodies."""
     for w in range(len(live)):
         if live[w]:
             boxes = reported.boxes[w, : reported.counts[w]]
             for n in range(len(boxes)):
-                _copy(bodies.boxes[w, reported.bodies[w, n]], boxes[n])
-            _copy_rows(seen_by(sensors, w, boxes), boxes)
+                copy_row(bodies.boxes[w, reported.bodies[w, n]], boxes[n])
+            seen = seen_by(sensors, w, boxes)
+            for n in range(len(boxes)):
+                copy_row(seen[n], boxes[n])
 
 
 @compiled()
@@ -243,10 +204,8 @@ def _look(
             table = _photograph(cameras, w, camera, sensors, boxes, bodies, outlines, room)
             for n in range(len(table)):
                 shown[w, table[n, 0]] |= table[n, 5] >= MIN_PIXELS
-            rows, objects = reported_boxes(table, classes, camera)
-            _copy_rows(rows, seen.rows[w, count:])
-            _copy(objects, seen.objects[w, count:])
-            count += len(rows)
+            rows, objects = seen.rows[w], seen.objects[w]
+            count = add_reported(table, classes, camera, rows, objects, count)
         seen.counts[w] = count
 
 
@@ -267,7 +226,7 @@ def _look_for(
         for body in asked[w]:
             if not live[w] or body == NO_BODY:
                 continue
-            _copy(bodies.boxes[w, body], box[0])
+            copy_row(bodies.boxes[w, body], box[0])
             around = seen_by(sensors, w, box)
             for camera in range(len(cameras.sizes)):
                 table = _photograph(cameras, w, camera, sensors, around, bodies, outlines, room)
@@ -284,11 +243,8 @@ def _room(live: Mask, cameras: MountedCameras, bodies: Bodies, outlines: Outline
     for camera in range(len(cameras.sizes)):
         width, height = max(width, cameras.sizes[camera, 0]), max(height, cameras.sizes[camera, 1])
     counts = parts, outlines.meshes.faces.shape[1], outlines.meshes.edges.shape[1]
-    return _Room(
-        room_for(counts, width, height),
-        empty_line(width, _DEPTHS),
-        np.empty((bodies.poses.shape[1], 6), np.int64),
-    )
+    found = np.empty((bodies.poses.shape[1], 6), np.int64)
+    return room_for(counts, width, height), empty_line(width, _DEPTHS), found
 
 
 @compiled()
@@ -306,7 +262,7 @@ def _photograph(
     world's sensor. A window in which nobody can show MIN_PIXELS stays empty.
     """
     poses, parts = bodies.poses[world, : bodies.counts[world]], outlines.counts[world]
-    found = room.found[: len(poses)]
+    seen, line, found = room[0], room[1], room[2][: len(poses)]
     model = mounted_model(cameras, world, number)
     width, height = cameras.sizes[number]
     window = window_on(boxes, model, NEAR_M, width, height)
@@ -327,6 +283,6 @@ def _photograph(
     place = sensors.poses[world, :3] + mount[0]
     camera = PlacedCamera(place, mount[1:])
     lens = Lens(model.focal, model.centre[0], model.centre[1])
-    lay_silhouettes(camera, lens, window, _DEPTHS, meshes, poses, room.seen)
+    lay_silhouettes(camera, lens, window, _DEPTHS, meshes, poses, seen)
     no_picture = np.empty((0, 0), np.int64)
-    return found[: draw_silhouettes(room.seen, window, _DEPTHS, room.line, found, no_picture)]
+    return found[: draw_silhouettes(seen, window, _DEPTHS, line, found, no_picture)]

@@ -16,7 +16,7 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.base.hashing import mixed, normal, uniform
-from care_sim.core.arrays import Floats, Integers
+from care_sim.core.arrays import Floats, Integers, copy_row
 from care_sim.perception.measured.tables import Measurement
 
 RING_M = 10.0
@@ -140,8 +140,7 @@ def _keep_living(rows: Floats, count: int, keyframe: int, place: Place) -> int:
     for n in range(count):
         tile = math.floor(rows[n, X] / TILE_M), math.floor(rows[n, Y] / TILE_M)
         if rows[n, LAST] >= keyframe and _is_near(tile, place):
-            for column in range(SEEN):
-                rows[kept, column] = rows[n, column]
+            copy_row(rows[n], rows[kept])
             kept += 1
     return kept
 

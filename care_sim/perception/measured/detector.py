@@ -28,8 +28,6 @@ GATHERED_S = 1.0
 those of the last ten keyframes, of 0.1 s each. With longer keyframes it has as many as fit in this
 time.
 """
-
-
 _HERE = np.ones(1, np.bool_)
 
 
@@ -177,7 +175,7 @@ class MeasuredEpisode(Detector):
         met = len(known)
         rows = [known.setdefault(one, len(known)) for one in objects.tolist()]
         world.make_room(len(known))
-        world.memory.first[0, met:] = world.keyframe(0)
+        world.memory.first[0, met:] = world.clock[1][0]
         world.memory.rows[0, : len(rows)] = rows
         world.memory.ranks[0, : len(rows)] = np.argsort(np.argsort(objects))
         self._objects = objects

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.core.arrays import Floats, Integers
+from care_sim.core.arrays import Floats, Integers, copy_row
 from care_sim.core.cells.stack import Grid
 from care_sim.perception.found import Found
 from care_sim.perception.matching import MATCH_M
@@ -22,7 +22,7 @@ from care_sim.perception.measured.candidates import (
     SEEN,
     Candidates,
 )
-from care_sim.perception.measured.reporting import Rules, copy_box
+from care_sim.perception.measured.reporting import Rules
 from care_sim.sensors.annotated import NO_OBJECT
 
 FREE_WIDTH_M, FREE_LENGTH_M = 3.0, 20.0
@@ -62,8 +62,7 @@ def view_of(grid: Grid, sensor_height_m: float) -> View:
         down = np.tan(np.minimum(elevations, -1e-9))
         roads = np.where(elevations < 0, -(sensor_height_m + head.place[2]) / down, np.inf)
         order = np.argsort(azimuths)
-        cosines = np.cos(elevations)
-        own = azimuths, elevations, cosines, roads
+        own = azimuths, elevations, np.cos(elevations), roads
         columns.append([head.first + order, *(column[order] for column in own)])
     cells, azimuths, elevations, cosines, roads = map(np.concatenate, zip(*columns, strict=True))
     return View(
@@ -98,7 +97,7 @@ def report_false_boxes(
             at = found.counts[w]
             found.classes[w, at], found.objects[w, at] = int(row[LABEL]), NO_OBJECT
             found.scores[w, at], found.returns[w, at] = min(row[SCORE], rules.most), 0
-            copy_box(box, found.boxes[w, at])
+            copy_row(box, found.boxes[w, at])
             found.counts[w] += 1
 
 

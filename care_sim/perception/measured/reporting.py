@@ -7,18 +7,11 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.base.hashing import mixed
-from care_sim.core.arrays import Floats, Integers
+from care_sim.core.arrays import Floats, Integers, copy_row
 from care_sim.perception.found import Found
 from care_sim.perception.matching import MATCH_M
 from care_sim.perception.measured.candidates import Kinds
-from care_sim.perception.measured.luck import (
-    FIRST_ERROR,
-    LUCK,
-    TURNED,
-    Memory,
-    Shares,
-    signal_of,
-)
+from care_sim.perception.measured.luck import FIRST_ERROR, LUCK, TURNED, Memory, Shares, signal_of
 from care_sim.perception.measured.recall import effective_returns, latent_score, score_of
 from care_sim.perception.measured.tables import ERRORS, SIGNALS, WIDEST_NORMAL, Errors, Recall
 from care_sim.perception.proxy import count_hits
@@ -103,18 +96,10 @@ def report_objects(
         found.classes[w, count], found.objects[w, count] = label, objects[n]
         found.scores[w, count], found.returns[w, count] = score, by_rank[ranks[n]]
         box = found.boxes[w, count]
-        copy_box(boxes[n], box)
+        copy_row(boxes[n], box)
         _misplace(box, label, max(average * worth, 1.0), signals, rules.errors)
         count += 1
     found.counts[w] = count
-
-
-@compiled()
-def copy_box(box: Floats, into: Floats) -> None:
-    """Copy a box (7,)."""
-    # Faster than an assignment of slices.
-    for k in range(7):
-        into[k] = box[k]
 
 
 @compiled()

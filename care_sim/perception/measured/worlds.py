@@ -7,12 +7,7 @@ from care_sim.base.threads import Threads
 from care_sim.core.arrays import Floats, Integers, Mask, longer
 from care_sim.core.cells.stack import Grid
 from care_sim.perception.found import Found
-from care_sim.perception.measured.candidates import (
-    COLUMNS,
-    Candidates,
-    Kinds,
-    advance_candidates,
-)
+from care_sim.perception.measured.candidates import COLUMNS, Candidates, Kinds, advance_candidates
 from care_sim.perception.measured.false_boxes import View, report_false_boxes, view_of
 from care_sim.perception.measured.luck import Memory
 from care_sim.perception.measured.reporting import Rules, report_objects
@@ -38,7 +33,7 @@ class MeasuredWorlds:
 
     def __init__(self, rules: Rules, grid: Grid, worlds: int, threads: Threads):
         self._rules, self._grid, self._threads = rules, grid, threads
-        self._clock = np.zeros(worlds, np.uint64), np.zeros(worlds, np.int64)
+        self.clock = np.zeros(worlds, np.uint64), np.zeros(worlds, np.int64)
         rows = np.zeros((worlds, _CANDIDATES, COLUMNS))
         self._candidates = Candidates(np.zeros(worlds, np.int64), rows, np.empty((worlds, 2)))
         self.memory = Memory.of(worlds, _OBJECTS, len(rules.weights))
@@ -47,7 +42,7 @@ class MeasuredWorlds:
         """Begin an episode, in which so many objects are present from the start on, by ascending
         number.
         """
-        self._clock[0][world], self._clock[1][world] = seed.generate_state(1, np.uint64)[0], 0
+        self.clock[0][world], self.clock[1][world] = seed.generate_state(1, np.uint64)[0], 0
         self._candidates.counts[world], self._candidates.before[world] = 0, np.nan
         self.make_room(objects)
         fresh = Memory.of(1, self.memory.first.shape[1], len(self._rules.weights))
@@ -62,10 +57,6 @@ class MeasuredWorlds:
             for table, old in zip(self.memory, known, strict=True):
                 table[:, :room] = old
 
-    def keyframe(self, world: int) -> int:
-        """Return the number of the coming keyframe of a world, from 0."""
-        return int(self._clock[1][world])
-
     def advance(self, live: Mask, places: Floats) -> Candidates:
         """Advance the candidates for false boxes in the worlds that are `live` (W,), whose sensors
         are at `places` (W, 2 or more). Before `report`, the caller fills in their boxes in the
@@ -73,7 +64,7 @@ class MeasuredWorlds:
         """
         needed = np.zeros(len(live), np.int64)
         while live.any():
-            given = self._clock, places, self._candidates, self._rules.kinds, needed
+            given = self.clock, places, self._candidates, self._rules.kinds, needed
             self._threads.share(_advance, live, *given)
             rows = self._candidates.rows
             live = live & (needed > rows.shape[1])
@@ -97,7 +88,7 @@ class MeasuredWorlds:
         """
         found = found.with_room(present[1].shape[1] + self._candidates.rows.shape[1])
         view = view_of(self._grid, self._rules.sensor_height_m)
-        given = self._clock, present, (*returned, sweeps), newest
+        given = self.clock, present, (*returned, sweeps), newest
         tables = self._candidates, view, self.memory, self._rules, found
         self._threads.share(_report, live, *given, *tables)
         return found

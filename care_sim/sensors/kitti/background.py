@@ -6,9 +6,9 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.base.hashing import normal, uniform
-from care_sim.core.arrays import Floats, Integers
+from care_sim.core.arrays import Floats, Integers, copy_row
 from care_sim.sensors.kitti.draws import key_of
-from care_sim.sensors.kitti.errors import copy_box, iou, is_cut, lay_erring, lay_normals, resembles
+from care_sim.sensors.kitti.errors import iou, is_cut, lay_erring, lay_normals, resembles
 from care_sim.sensors.kitti.invented import (
     LEAST_HEIGHT,
     LEAST_WIDTH,
@@ -132,7 +132,7 @@ def add_lent(
         own = key_of(key, n, 0, 0)
         score = score_at(numbers.scene_scores[kind], normal(own, 0), numbers)
         add_box(into, count, lent[0][n], score)
-        copy_box(lent[1][n], into.edges[count])
+        copy_row(lent[1][n], into.edges[count])
         add_errors(into.edges[count], kind, score, (own, 1.0), shown.frame, numbers)
         count += 1
     return count
@@ -151,11 +151,11 @@ def add_errors(
     an object's normal numbers that those of the key have.
     """
     whole, normals, cut = np.empty(4), np.empty(4), np.empty(4, np.bool_)
-    copy_box(box, whole)
+    copy_row(box, whole)
     lay_normals(chance[0], 1, normals)
     for j in range(4):
         normals[j] *= math.sqrt(chance[1])
         cut[j] = is_cut(whole, j, picture)
     lay_erring(whole, (kind, 0, score), cut, normals, picture, numbers, box)
     if not resembles(box, whole):
-        copy_box(whole, box)
+        copy_row(whole, box)

@@ -4,24 +4,22 @@ suppression, and last whole pixels for all boxes alike.
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
 from care_sim.base.threads import Threads
-from care_sim.core.arrays import Floats, Integers, Mask, longer
+from care_sim.core.arrays import Floats, Integers, Mask, copy_row, longer
 from care_sim.core.pinhole import MountedCameras, PinholeCamera
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import NO_OBJECT
-from care_sim.sensors.camera_faults import Detected
+from care_sim.sensors.camera_faults import Detected, place_of
 from care_sim.sensors.kitti.background import add_lent, add_scene
 from care_sim.sensors.kitti.beside import PAIRS, add_beside
 from care_sim.sensors.kitti.draws import PersistentNormals, Renewals, key_of
 from care_sim.sensors.kitti.errors import (
     TRIES,
-    copy_box,
     kept,
     lay_erring,
     lay_normals,
@@ -40,31 +38,6 @@ _CLASS, _CONFIDENCE = ImageDetections.CLASS, ImageDetections.CONFIDENCE
 _LEFT, _CAMERA = ImageDetections.LEFT, ImageDetections.CAMERA
 
 
-class Draws(NamedTuple):
-    """Draws of a keyframe: (objects,) luck as normal numbers, (objects, 4) errors of edges, a key,
-    and the chance of false boxes.
-    """
-
-    luck: Floats
-    edges: Floats
-    key: np.uint64
-    false: Chance
-
-
-class Lasting(NamedTuple):
-    """Chance of W worlds at a keyframe. `luck` (W, n) and `edges` (W, n, 4) of n objects are as in
-    `Draws`, `beside` (W, n, ...) and `scene` (W, k, ...) as in `Chance`. `keys` (W, 2) are that of
-    false boxes and that of the episode. `keyframes` (W,) count from 1.
-    """
-
-    luck: Floats
-    edges: Floats
-    beside: Integers
-    scene: Integers
-    keys: NDArray[np.uint64]
-    keyframes: Integers
-
-
 class KittiDetectors:
     """Make of faultless detections in W worlds what the detector reports. Every kind of chance has
     a random stream of its own. Pictures are of so many `cameras`.
@@ -74,12 +47,9 @@ class KittiDetectors:
         self._numbers, times = measured()
         self._threads = threads
         self._cameras = cameras
-        lasting, shares = [times.edges_lasting] * EDGES, [times.edges_share] * EDGES
-        edges_s = [times.edges_s] * EDGES
-        self._edges = PersistentNormals(worlds, lasting, shares, edges_s, keyframe_s)
-        self._luck = PersistentNormals(
-            worlds, [0.0], [times.luck_share], [times.luck_s], keyframe_s
-        )
+        of_edges = times.edges_lasting, times.edges_share, times.edges_s
+        self._edges = PersistentNormals(worlds, EDGES, *of_edges, keyframe_s)
+        self._luck = PersistentNormals(worlds, 1, 0.0, times.luck_share, times.luck_s, keyframe_s)
         self._beside, self._scene = (
             Renewals(worlds, states * MOST, times.false_s, keyframe_s)
             for states in (PAIRS, len(self._numbers.pair_scores))
@@ -104,7 +74,7 @@ class KittiDetectors:
         self._scene.begin(world, self._cameras, scene)
         self._keys[world] = key.integers(2**63, size=2).astype(np.uint64)
         self._keyframes[world] = 0
-        self._pictures[world] = pictures_of(cameras, FOCAL_PX)
+        self._pictures[world] = pictures_of(cameras)
 
     def detect(
         self,
@@ -123,30 +93,16 @@ class KittiDetectors:
         """
         # Everything is drawn at every keyframe, whatever is there.
         self._keyframes += live
-        lasting = Lasting(
-            np.ascontiguousarray(self._luck.next(live)[..., 0]),
-            self._edges.next(live),
-            self._beside.next(live),
-            self._scene.next(live),
-            self._keys,
-            self._keyframes,
-        )
+        normals = np.ascontiguousarray(self._luck.next(live)[..., 0]), self._edges.next(live)
+        begun = self._beside.next(live), self._scene.next(live)
         most = int(seen.counts.max())
         room = most * (1 + PAIRS * MOST) + self._cameras * len(self._numbers.pairs) * MOST
         if room > seen.rows.shape[1]:
             seen = Detected(seen.counts, longer(seen.rows, room), longer(seen.objects, room))
-        given = objects, visible, cameras, self._pictures, lasting, self._numbers
-        self._threads.share(_report, live, seen, false, *given)
+        given = objects, visible, cameras, self._pictures
+        drawn = self._keys, self._keyframes, normals, begun
+        self._threads.share(_report, live, seen, false, *given, *drawn, self._numbers)
         return seen
-
-
-@compiled()
-def _place_of(body: int, objects: Integers) -> int:
-    """The place of an object among others, 0 of any other."""
-    for place in range(len(objects)):
-        if objects[place] == body:
-            return place
-    return 0
 
 
 @compiled()
@@ -158,10 +114,15 @@ def _report(
     visible: Floats,
     cameras: MountedCameras,
     pictures: Floats,
-    lasting: Lasting,
+    keys: NDArray[np.uint64],
+    keyframes: Integers,
+    normals: tuple[Floats, Floats],
+    begun: tuple[Integers, Integers],
     numbers: Numbers,
 ) -> None:
-    """See `KittiDetectors.detect`."""
+    """See `KittiDetectors.detect`. `keys` (W, 2) are that of false boxes and that of the episode,
+    `keyframes` (W,) count from 1. `normals` and `begun` are the arrays of `Chance`, of W worlds.
+    """
     for w in range(len(live)):
         if not live[w]:
             continue
@@ -169,13 +130,13 @@ def _report(
         rows, bodies = seen.rows[w, :count].copy(), seen.objects[w, :count].copy()
         places = np.empty(count, np.int64)
         for n in range(count):
-            places[n] = _place_of(bodies[n], objects[1][w, :known])
+            places[n] = max(place_of(bodies[n], objects[1][w, :known]), 0)
         labels = labels_of(rows, places, visible[w], objects[2][w], cameras, w)
         lent = _lent(seen.rows[w, count : seen.counts[w]], cameras.focals)
-        now = key_of(lasting.keys[w, 1], lasting.keyframes[w], 0, 0)
-        chance = Chance(lasting.keys[w, 0], now, lasting.beside[w, :known], lasting.scene[w])
-        draws = Draws(lasting.luck[w, :known], lasting.edges[w, :known], now, chance)
-        found, shown_in = report(labels, pictures[w], lent, draws, numbers)
+        now = key_of(keys[w, 1], keyframes[w], 0, 0)
+        own = normals[0][w, :known], normals[1][w, :known], begun[0][w, :known]
+        chance = Chance(keys[w, 0], now, own[0], own[1], own[2], begun[1][w])
+        found, shown_in = report(labels, pictures[w], lent, chance, numbers)
 
         false[w] = _enter(seen, w, (rows, bodies), found, shown_in, cameras.focals)
 
@@ -229,7 +190,7 @@ def report(
     labels: Labels,
     pictures: Floats,
     lent: tuple[Integers, Floats, Integers],
-    draws: Draws,
+    chance: Chance,
     numbers: Numbers,
 ) -> tuple[Boxes, Integers]:
     """The boxes of all pictures (p, 5), not rounded yet, and the picture of each.
@@ -242,15 +203,14 @@ def report(
         np.empty(most, np.int64), np.empty(most), np.empty((most, 4)), np.empty(most, np.int64)
     )
     shown_in = np.empty(most, np.int64)
-    scores = _scores(labels, draws.luck, numbers)
+    scores = _scores(labels, chance.luck, numbers)
     count = 0
     for number in range(len(pictures)):
         (own,) = np.nonzero(labels.cameras == number)
         into = _part(all_boxes, count, most)
         shown = Picture(labels, own, number, pictures[number], numbers, into)
-        added = _add_picture(shown, scores, lent, draws)
-        for n in range(count, count + added):
-            shown_in[n] = number
+        added = _add_picture(shown, scores, lent, chance)
+        shown_in[count : count + added] = number
         count += added
     return _part(all_boxes, 0, count), shown_in[:count]
 
@@ -289,15 +249,15 @@ def _scores(labels: Labels, luck: Floats, numbers: Numbers) -> Floats:
 
 @compiled()
 def _add_picture(
-    shown: Picture, scores: Floats, lent: tuple[Integers, Floats, Integers], draws: Draws
+    shown: Picture, scores: Floats, lent: tuple[Integers, Floats, Integers], chance: Chance
 ) -> int:
     """Enter the boxes of a picture; return how many."""
     into, numbers = shown.into, shown.numbers
     reported = scores, np.empty((len(scores), EDGES))
-    count = _add_found(shown, reported, draws)
-    count = add_beside(shown, reported, draws.false, count)
-    count = add_scene(shown, draws.false, count)
-    count = add_lent(shown, lent, draws.key, count)
+    count = _add_found(shown, reported, chance)
+    count = add_beside(shown, reported, chance, count)
+    count = add_scene(shown, chance, count)
+    count = add_lent(shown, lent, chance.now, count)
     stays = kept(
         into.edges[:count],
         into.scores[:count],
@@ -309,7 +269,7 @@ def _add_picture(
 
 
 @compiled()
-def _add_found(shown: Picture, reported: tuple[Floats, Floats], draws: Draws) -> int:
+def _add_found(shown: Picture, reported: tuple[Floats, Floats], chance: Chance) -> int:
     """Enter the found objects' boxes after errors, the surest first; return how many. Fill
     `reported[1]` (n, 4) with them, and with the labels' boxes of missed objects.
     """
@@ -317,27 +277,29 @@ def _add_found(shown: Picture, reported: tuple[Floats, Floats], draws: Draws) ->
     count = 0
     for place in surest_of(scores[shown.own]):
         i = shown.own[place]
-        copy_box(labels.boxes[i], erring[i])
+        copy_row(labels.boxes[i], erring[i])
         if scores[i] > 0:
-            _lay_own(shown, i, scores[i], count, draws, erring[i])
+            _lay_own(shown, i, scores[i], count, chance, erring[i])
             into.classes[count], into.scores[count] = labels.classes[i], scores[i]
             into.sources[count] = i
-            copy_box(erring[i], into.edges[count])
+            copy_row(erring[i], into.edges[count])
             count += 1
     return count
 
 
 @compiled()
-def _lay_own(shown: Picture, i: int, score: float, surer: int, draws: Draws, into: Floats) -> None:
+def _lay_own(
+    shown: Picture, i: int, score: float, surer: int, chance: Chance, into: Floats
+) -> None:
     """Let an object's box `into` (4,) err. Errors are drawn again while the box would not count as
     the object's, or one of the `surer` boxes of its class that are entered suppresses it.
     """
     labels, numbers, entered = shown.labels, shown.numbers, shown.into
     place, label = labels.places[i], labels.boxes[i]
     seen_as = labels.kinds[i], labels.levels[i], score
-    key = key_of(draws.key, place, 1, 0)
+    key = key_of(chance.now, place, 1, 0)
     normals, trial = np.empty(EDGES), np.empty(EDGES)
-    copy_box(draws.edges[place], normals)
+    copy_row(chance.edges[place], normals)
     has_one, most = False, numbers.suppression_iou
     for t in range(TRIES):
         if t:
@@ -349,7 +311,7 @@ def _lay_own(shown: Picture, i: int, score: float, surer: int, draws: Draws, int
             trial, labels.classes[i], entered.edges, entered.classes, surer, most
         )
         if not (covered and has_one):
-            copy_box(trial, into)
+            copy_row(trial, into)
         has_one = True
         if not covered:
             return
@@ -363,6 +325,6 @@ def _pack(boxes: Boxes, stays: Mask) -> int:
         if stays[n]:
             boxes.classes[count], boxes.scores[count] = boxes.classes[n], boxes.scores[n]
             boxes.sources[count] = boxes.sources[n]
-            copy_box(boxes.edges[n], boxes.edges[count])
+            copy_row(boxes.edges[n], boxes.edges[count])
             count += 1
     return count

@@ -10,7 +10,6 @@ import math
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from care_sim.base.compiled import compiled
 from care_sim.base.hashing import mixed
@@ -24,29 +23,29 @@ _AHEAD = 16
 class PersistentNormals:
     """Standard normal numbers (W, n, k), k of each of n objects of W worlds.
 
-    At a distance of t seconds column j has the correlation
-    `lasting[j]` + `shares[j]` exp(-t / `times_s[j]`), and 1 at t = 0.
+    At a distance of t seconds they have the correlation `lasting` + `share` exp(-t / `time_s`), and
+    1 at t = 0.
     """
 
     def __init__(
         self,
         worlds: int,
-        lasting: ArrayLike,
-        shares: ArrayLike,
-        times_s: ArrayLike,
+        columns: int,
+        lasting: float,
+        share: float,
+        time_s: float,
         keyframe_s: float,
     ):
-        lasting, shares = np.asarray(lasting, float), np.asarray(shares, float)
-        self._kept = np.exp(-keyframe_s / np.asarray(times_s, float))
-        self._lasting, self._share = np.sqrt(lasting), np.sqrt(shares)
-        self._fresh = np.sqrt(1 - lasting - shares)
-        self._always = self._slow = np.zeros((worlds, 0, len(shares)))
+        self._kept = np.exp(-keyframe_s / time_s)
+        self._lasting, self._share = np.sqrt(lasting), np.sqrt(share)
+        self._fresh = np.sqrt(1 - lasting - share)
+        self._always = self._slow = np.zeros((worlds, 0, columns))
         self._started = np.zeros(worlds, np.bool_)
         self._draws = DrawnAhead(worlds, _AHEAD)
 
     def begin(self, world: int, objects: int, rng: np.random.Generator) -> None:
         """Begin an episode with so many objects."""
-        always, slow = rng.standard_normal((2, objects, len(self._share)))
+        always, slow = rng.standard_normal((2, objects, self._slow.shape[2]))
         self._always = filled(self._always, world, self._lasting * always)
         self._slow = filled(self._slow, world, slow)
         self._started[world] = False

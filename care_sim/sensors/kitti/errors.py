@@ -171,10 +171,3 @@ def kept(boxes: Floats, scores: Floats, classes: Integers, sources: Integers, mo
             if object_wins and classes[j] == classes[i] and iou(boxes[i], boxes[j]) > most:
                 stays[i] = False
     return stays
-
-
-@compiled()
-def copy_box(box: Floats, into: Floats) -> None:
-    """Copy a box (4,). An assignment of slices takes seconds to compile."""
-    for j in range(4):
-        into[j] = box[j]

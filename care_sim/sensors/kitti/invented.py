@@ -28,12 +28,16 @@ TOUCHING = 0.1
 
 
 class Chance(NamedTuple):
-    """Random sources of false boxes: a `key`, a key of the keyframe (`now`), and the first keyframe
-    of each lasting box.
+    """Random sources of a keyframe: a `key` of false boxes, a key of the keyframe (`now`), normal
+    numbers of objects, and the first keyframe of each lasting false box.
     """
 
     key: np.uint64
     now: np.uint64
+    luck: Floats
+    """(objects,)."""
+    edges: Floats
+    """(objects, 4)."""
     beside: Integers
     """(objects, PAIRS * MOST)."""
     scene: Integers

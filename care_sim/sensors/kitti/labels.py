@@ -70,16 +70,16 @@ class Labels(NamedTuple):
     """(n,) the place of each among all objects that may ever be seen."""
 
 
-def pictures_of(cameras: Sequence[PinholeCamera], focal_px: float) -> Floats:
+def pictures_of(cameras: Sequence[PinholeCamera]) -> Floats:
     """Return (k, 5) width, height, middle column and horizon row of the cameras' pictures, and the
-    camera's height over KITTI's. Lengths are in pixels of the focal length `focal_px`. Assumes the
-    LiDAR LIDAR_HEIGHT_M above the road and no roll of cameras.
+    camera's height over KITTI's. Assumes the LiDAR LIDAR_HEIGHT_M above the road and no roll of
+    cameras.
     """
     rows = [
         (each.width, each.height, each.width / 2, each.height / 2 + each.focal * np.tan(each.pitch))
         for each in cameras
     ]
-    scales = np.array([focal_px / each.focal for each in cameras])
+    scales = np.array([FOCAL_PX / each.focal for each in cameras])
     pixels: Floats = np.array(rows, float).reshape(-1, 4) * scales[:, None]
     heights = np.array([LIDAR_HEIGHT_M + each.position[2] for each in cameras])
     return np.column_stack([pixels, heights / KITTI_CAMERA_M])

@@ -231,7 +231,7 @@ def test_the_number_of_cameras_changes_no_false_box_beside_an_object():
 
 def test_a_lower_camera_sees_objects_end_less_far_below_the_horizon():
     """A picture without cars has their mean place on KITTI's, where cameras are 1.65 m high."""
-    (picture,) = pictures_of([FRONT_CAMERA], FOCAL_PX)
+    (picture,) = pictures_of([FRONT_CAMERA])
     assert picture[4] == pytest.approx((1.84 - 0.33) / 1.65)
     boxes = np.array([box(CAR, 20.0)])
     labels = labels_in(seen_of([CAR], boxes), boxes)

@@ -17,7 +17,7 @@ def test_chance_of_many_worlds_is_that_of_each_alone():
     """Worlds have their own numbers of objects, and pictures at their own times."""
     sizes, rng = (3, 0, 40), np.random.default_rng(0)
     makers = (
-        partial(PersistentNormals, lasting=[0.3, 0.0], shares=[0.4, 1.0], times_s=[1.0, 0.3]),
+        partial(PersistentNormals, columns=2, lasting=0.3, share=0.4, time_s=1.0),
         partial(Renewals, states=5, time_s=0.2),
     )
     for make in makers:
@@ -38,7 +38,7 @@ def test_normal_numbers_are_drawn_keyframe_by_keyframe():
     every keyframe.
     """
     lasting, share, kept = 0.36, 0.44, np.exp(-KEYFRAME_S / 0.49)
-    draws = PersistentNormals(1, [lasting], [share], [0.49], KEYFRAME_S)
+    draws = PersistentNormals(1, 1, lasting, share, 0.49, KEYFRAME_S)
     draws.begin(0, 3, np.random.default_rng(5))
     rng = np.random.default_rng(5)
     always, slow = rng.standard_normal((2, 3))
@@ -55,7 +55,7 @@ def test_normal_numbers_are_drawn_keyframe_by_keyframe():
     ("lasting", "share", "time_s"), [(0.0, 0.76, 1.29), (0.36, 0.44, 0.49), (0.0, 1.0, 0.3)]
 )
 def test_normal_numbers_are_correlated_as_stated(lasting, share, time_s):
-    draws = PersistentNormals(1, [lasting], [share], [time_s], KEYFRAME_S)
+    draws = PersistentNormals(1, 1, lasting, share, time_s, KEYFRAME_S)
     draws.begin(0, 4000, np.random.default_rng(0))
     numbers = np.array([draws.next(HERE)[0, :4000, 0] for _ in range(40)])
     assert numbers.std(axis=1) == pytest.approx(np.ones(40), abs=0.05)
