@@ -52,7 +52,8 @@ class Detecting:
         self.is_proxy = all(one is None for one in detectors)
         """Whether all detect by the number of returns."""
         first, self._measured = detectors[0], None
-        if isinstance(first, MeasuredDetector):
+        # A class with its own `begin` detects by what that returns.
+        if isinstance(first, MeasuredDetector) and type(first).begin is MeasuredDetector.begin:
             self._measured = first.worlds(worlds, rigs[0], False, threads)
         self.bodies = [np.empty(0, np.int64)] * worlds
         self.detected = np.zeros(worlds, np.bool_)

@@ -4,7 +4,7 @@ The engine `fast` draws the pictures (`care_sim.sensors.engines.picture_kernels`
 detectors report what is in them (`care_sim.sensors.camera`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -60,7 +60,8 @@ class Seeing:
         self.after_steps: Integers = np.rint(self.detectors.after_s / WORLD_STEP_S).astype(np.int64)
         """(W,) world steps from a keyframe to the pictures that it takes."""
         self._designed = mounted_cameras(worlds, rig.cameras)
-        self._built: list[World | None] = [None] * worlds
+        # By world, what draws with another engine, and the classes of the reported bodies.
+        self._drawers: dict[int, tuple[Engine, Mapping[int, int]]] = {}
         # Bodies of whom somebody asks at every keyframe, whether a camera shows them.
         self._asked = np.full((worlds, 1), NO_BODY)
         self._asks_few = np.zeros(worlds, np.bool_)
@@ -73,7 +74,8 @@ class Seeing:
         """
         labels = built.labels()
         self.detectors.begin(world, [*labels], seed, pool)
-        self._built[world] = built
+        if not self.is_fast:
+            self._drawers[world] = make_engine(self._engine, built.bullet, self._rig.grid), labels
         target = built.first_sighting
         asked = [one.body for one in built.meetings] + ([target.body] if target else [])
         if len(asked) > self._asked.shape[1]:
@@ -140,22 +142,21 @@ class Seeing:
         if not who.any():
             return seen
         cameras = self.detectors.cameras if are_mounted else self._designed
-        shown = np.zeros_like(self._shown) if are_mounted else self._shown
+        # An event between two keyframes may have added bodies.
+        shown = np.zeros(state.bodies.boxes.shape[:2], np.bool_) if are_mounted else self._shown
         if self.is_fast:
             tables = state.sensors, state.bodies, state.outlines, reported
             self._threads.share(_look, who, cameras, *tables, seen, shown)
             return seen
         # Another engine draws its own pictures, world by world.
         for world in np.flatnonzero(who).tolist():
-            built = self._built[world]
-            assert built is not None
+            engine, labels = self._drawers[world]
             made = self.detectors.mounted[world] if are_mounted else self._rig.cameras
-            engine = make_engine(self._engine, built.bullet, self._rig.grid)
             boxes = reported.boxes[world, : reported.counts[world]].copy()
             drawn = photographed(engine, made, state.sensors.frame(world), boxes)
             large = [row[0] for table in drawn for row in table if row[5] >= MIN_PIXELS]
             shown[world, large] = True
-            seen = seen.put(world, faultless_detections(drawn, built.labels()))
+            seen = seen.put(world, faultless_detections(drawn, labels))
         return seen
 
 
