@@ -228,7 +228,7 @@ def test_worlds_meet_what_each_meets_alone():
         counts, tables, _ = several.advance(live, places)
         for number in np.flatnonzero(live).tolist():
             # Until a report no keyframe is over.
-            several._clock[1][number] += 1
+            several.clock[1][number] += 1
             rows[keyframe, number] = tables[number, : counts[number], :SEEN].tolist()
     for number in range(3):
         lone.begin(0, np.random.SeedSequence(number))
@@ -237,7 +237,7 @@ def test_worlds_meet_what_each_meets_alone():
                 np.ones(1, np.bool_),
                 np.array([[[100.0 * keyframe, 30.0], [5.0 * keyframe, 0.0], [0.0, 0.0]][number]]),
             )
-            lone._clock[1][0] += 1
+            lone.clock[1][0] += 1
             assert table[:count, :SEEN].tolist() == rows[keyframe, number] != []
 
 
