@@ -3,8 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.base.compiled import compiled
-
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -25,11 +23,3 @@ def longer(table: np.ndarray, length: int, empty: int = 0) -> np.ndarray:
     grown = np.full((len(table), length, *table.shape[2:]), empty, table.dtype)
     grown[:, : table.shape[1]] = table
     return grown
-
-
-@compiled(brief=True)
-def copy_row(row: np.ndarray, into: np.ndarray) -> None:
-    """Copy a row (n,) to the first n places of `into`."""
-    # An assignment of slices is slower, and Numba compiles the text of its error for seconds.
-    for k in range(len(row)):
-        into[k] = row[k]

@@ -19,6 +19,7 @@ from care_sim.base.compiled import compiled
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.frames import Frame, turned
+from care_sim.core.rows import copy_row
 from care_sim.core.types import Detections, Tracks
 
 # Compiled code can only read module-level constants.
@@ -75,10 +76,10 @@ def sort_by_distance(tracks: Floats, boxes: Floats, turn: tuple[float, float]) -
         place = m
         while place > 0 and ranges[place - 1] > away:
             ranges[place] = ranges[place - 1]
-            _copy_row(seen, place - 1, seen, place)
+            copy_row(seen[place - 1], seen[place])
             place -= 1
         ranges[place] = away
-        _copy_row(tracks, m, seen, place)
+        copy_row(tracks[m], seen[place])
         _put_box(seen[place], boxes[m])
         seen[place, _VX] = cos * tracks[m, _VX] - sin * tracks[m, _VY]
         seen[place, _VY] = sin * tracks[m, _VX] + cos * tracks[m, _VY]
@@ -143,7 +144,7 @@ def advance_tracks(
         elapsed = (tracks[m, _MISSES] + 1) * life.keyframe_s
         if n < 0 and elapsed > life.coast_s + LAST_BITS_S:
             continue
-        _copy_row(tracks, m, result, count)
+        copy_row(tracks[m], result[count])
         result[count, _MISSES] += 1
         if n >= 0:
             _follow(result[count], seen[n], elapsed, life)
@@ -212,12 +213,6 @@ def _begin(track: Floats, number: int, label: int, box: Floats) -> None:
 def _put_box(track: Floats, box: Floats) -> None:
     for k in range(_BOX_WIDTH):
         track[_BOX + k] = box[k]
-
-
-@compiled()
-def _copy_row(source: Floats, row: int, target: Floats, place: int) -> None:
-    for k in range(source.shape[1]):
-        target[place, k] = source[row, k]
 
 
 _IMPOSSIBLE_M = 1e6

@@ -9,9 +9,10 @@ import numpy as np
 from care_sim.base.compiled import compiled
 from care_sim.base.threads import ALONE, Threads
 from care_sim.base.times import LAST_BITS_S
-from care_sim.core.arrays import Floats, Integers, Mask, copy_row, filled
+from care_sim.core.arrays import Floats, Integers, Mask, filled
 from care_sim.core.conditions import KITTI_CAMERA, YOLOX_CAMERA, CameraFaults, Sensing
 from care_sim.core.pinhole import PinholeCamera, mounted_cameras
+from care_sim.core.rows import copy_row
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import NO_OBJECT, IdentifiedDetections
 from care_sim.sensors.camera_errors import ProfiledDetector

@@ -69,9 +69,10 @@ def faultless_detections(
 def add_reported(
     table: Integers, classes: Integers, camera: int, rows: Floats, ids: Integers, count: int
 ) -> int:
-    """Add the detections of those bodies in a table of boxes that have a class and show enough
-    pixels to `rows` (D, 9), in the order of `ImageDetections.COLUMNS`, and to their `ids` (D,), of
-    which there are `count`; return how many there are then. `classes` by body id, -1 without one.
+    """Add detections to the `count` first of `rows` (D, 9), in the order of
+    `ImageDetections.COLUMNS`, and to their `ids` (D,). Return how many there are then. A body in a
+    table of boxes is detected if it has a class and shows enough pixels. `classes` are by body id,
+    -1 without one.
     """
     for n in range(len(table)):
         body, pixels = table[n, 0], table[n, 5]

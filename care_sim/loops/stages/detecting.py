@@ -10,8 +10,9 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.base.threads import Threads
-from care_sim.core.arrays import Floats, Integers, Mask, copy_row
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.rig import Rig
+from care_sim.core.rows import copy_row
 from care_sim.core.types import Scan
 from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.gathering import Gathering, acted_on

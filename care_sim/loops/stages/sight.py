@@ -10,7 +10,7 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.base.threads import Threads
-from care_sim.core.arrays import Floats, Integers, Mask, copy_row, longer
+from care_sim.core.arrays import Floats, Integers, Mask, longer
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Frame, turned_alike
 from care_sim.core.pinhole import (
@@ -22,6 +22,7 @@ from care_sim.core.pinhole import (
     window_on,
 )
 from care_sim.core.rig import Rig
+from care_sim.core.rows import copy_row
 from care_sim.loops.stages.state import Bodies, Outlines, Reported, Sensors, State, seen_by
 from care_sim.sensors.camera import CameraDetectors
 from care_sim.sensors.camera_faults import Detected

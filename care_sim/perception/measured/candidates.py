@@ -16,7 +16,8 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.base.hashing import mixed, normal, uniform
-from care_sim.core.arrays import Floats, Integers, copy_row
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.rows import copy_row
 from care_sim.perception.measured.tables import Measurement
 
 RING_M = 10.0

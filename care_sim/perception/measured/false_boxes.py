@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.core.arrays import Floats, Integers, copy_row
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.cells.stack import Grid
+from care_sim.core.rows import copy_row
 from care_sim.perception.found import Found
 from care_sim.perception.matching import MATCH_M
 from care_sim.perception.measured.candidates import (

@@ -7,7 +7,8 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.base.hashing import mixed
-from care_sim.core.arrays import Floats, Integers, copy_row
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.rows import copy_row
 from care_sim.perception.found import Found
 from care_sim.perception.matching import MATCH_M
 from care_sim.perception.measured.candidates import Kinds

@@ -6,7 +6,8 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.base.hashing import normal, uniform
-from care_sim.core.arrays import Floats, Integers, copy_row
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.rows import copy_row
 from care_sim.sensors.kitti.draws import key_of
 from care_sim.sensors.kitti.errors import iou, is_cut, lay_erring, lay_normals, resembles
 from care_sim.sensors.kitti.invented import (

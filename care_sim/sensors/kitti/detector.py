@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
 from care_sim.base.threads import Threads
-from care_sim.core.arrays import Floats, Integers, Mask, copy_row, longer
+from care_sim.core.arrays import Floats, Integers, Mask, longer
 from care_sim.core.pinhole import MountedCameras, PinholeCamera
+from care_sim.core.rows import copy_row
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.sensors.camera_faults import Detected, place_of
