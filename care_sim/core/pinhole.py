@@ -409,6 +409,6 @@ def mounted_cameras(worlds: int, cameras: Sequence[PinholeCamera]) -> MountedCam
     """The same cameras on so many cars."""
     models = camera_models(cameras)
     mounts = np.concatenate([models.positions[:, None], models.axes], axis=1)
-    sizes = np.array([(camera.width, camera.height) for camera in cameras]).reshape(-1, 2)
+    sizes = np.array([(one.width, one.height) for one in cameras], np.int64).reshape(-1, 2)
     many = np.tile(mounts, (worlds, 1, 1, 1))
     return MountedCameras(many, models.focals, models.centres, sizes)

@@ -91,7 +91,7 @@ class CameraDetectors:
         self.mounted = [self._designed] * worlds
         """(W,) the cameras as mounted, errors included."""
         self.cameras = mounted_cameras(worlds, cameras)
-        """The same."""
+        """The same, for compiled code."""
         self._objects = np.zeros(worlds, np.int64), np.zeros((worlds, 0), np.int64)
         self._false_boxes: dict[int, FalseBoxes] = {}
         self._profiled: dict[int, ProfiledDetector] = {}

@@ -20,7 +20,8 @@ SEEDS = (2, 3, 16, 46, 95, 137)
 
 class Passage(NamedTuple):
     """The outcome of a drive: the meetings; per body of one the least clearance after it set off;
-    the names of other touched bodies; how far the ego came, and its goal.
+    the names of other touched bodies; how far the ego came, and its goal; the seconds since each
+    who decided should have set off, when it was known.
     """
 
     meetings: list
@@ -28,6 +29,7 @@ class Passage(NamedTuple):
     touched: set
     along_m: float
     goal_m: float
+    late_s: dict
 
 
 def built(seed, **parameters):
@@ -41,7 +43,7 @@ def passage(seed):
     world = built(seed)
     met = {one.body for one in world.meetings}
     names = {actor.body: actor.name for actor in world.actors}
-    clearances, touched = {}, set()
+    clearances, touched, late_s = {}, set(), {}
     while world.along_m < world.goal_m and world.time < 59.0:
         speed = world.ego.speed
         planned = world.speed_plan.at(world.along_m + speed * 0.05)
@@ -49,11 +51,13 @@ def passage(seed):
         if impact and impact.body not in met:
             touched.add(names[impact.body])
         for one in world.meetings:
+            if one.crosser.went is not None:
+                late_s.setdefault(one.body, world.time - one.crosser.walk.starts_s)
             if one.crosser.went:
                 near = world.bullet.clearance(world.ego_body, one.body, 9.0)
                 clearances[one.body] = min(clearances.get(one.body, 9.0), near)
     world.close()
-    return Passage(world.meetings, clearances, touched, world.along_m, world.goal_m)
+    return Passage(world.meetings, clearances, touched, world.along_m, world.goal_m, late_s)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -62,6 +66,11 @@ def test_an_ego_that_drives_on_hits_every_conflict_and_nobody_else_who_comes(see
     for one in drive.meetings:
         if one.crosser.went:
             assert (drive.clearances[one.body] <= 0.0) is (one.course == "conflict")
+
+
+def test_who_comes_decides_within_a_step_of_the_moment():
+    late_s = [each for seed in SEEDS for each in passage(seed).late_s.values()]
+    assert 0 <= min(late_s) <= max(late_s) <= WORLD_STEP_S + 1e-9
 
 
 def test_these_drives_hold_every_course_and_nearly_all_set_off():
