@@ -26,7 +26,7 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import Action
 from care_sim.loops.observation_limits import Limits
 from care_sim.loops.stages.choice import Choice, check_finite
-from care_sim.loops.truth import Truth, Watchable
+from care_sim.loops.truth import TrueLoop, Truth
 from care_sim.perception.detectors import CLUSTER, PROXY, check_detector, make_detector
 from care_sim.perception.points_only import Detector
 from care_sim.sensors.lidar import check_dead_rows
@@ -109,7 +109,7 @@ def detector_of(
 
 
 Observed = dict[str, NDArray[np.float32]]
-AnyLoop = TypeVar("AnyLoop", bound=Watchable)
+AnyLoop = TypeVar("AnyLoop", bound=TrueLoop)
 AnyConditions = TypeVar("AnyConditions", bound=Conditions)
 
 

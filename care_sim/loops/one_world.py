@@ -1,6 +1,6 @@
 """One world of the closed loop, with all that is true about it."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,14 +12,14 @@ from care_sim.core.frames import Frame
 from care_sim.core.grid import Cells
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
-from care_sim.core.types import Scan, Tracks
+from care_sim.core.types import Scan
 from care_sim.loops.episode import Episode, SensorSeeds
 from care_sim.loops.loop import Loop
 from care_sim.loops.records import Keyframe, Records
 from care_sim.loops.stages.scanning import lidar_of
 from care_sim.loops.stages.sight import photographed
 from care_sim.loops.stages.state import Fired
-from care_sim.loops.truth import TrackObjects
+from care_sim.loops.truth import TrueLoop
 from care_sim.perception.points_only import Detector
 from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.engines import make_engine
@@ -32,20 +32,16 @@ _HERE = np.ones(1, np.bool_)
 _NO_FAULT = np.random.SeedSequence(0)
 
 
-class OneWorld:
+class OneWorld(TrueLoop):
     """The episode that runs in a loop of one world. Its attributes are of the coming keyframe: they
     change with every call of `keyframe`. Use the one of the current episode: `reset` makes another.
     """
 
-    index: int
-    """The number of the coming keyframe, from 0."""
-
     def __init__(self, loop: Loop):
+        super().__init__()
         self._loop = loop
-        self._objects = TrackObjects()
         self._kept: tuple[int, Belief] | None = None
         self.rig = loop.rig
-        self.index = 0
 
     @classmethod
     def begun(
@@ -74,7 +70,7 @@ class OneWorld:
         """The record of the keyframe that the loop has played since."""
         loop, found, impact = self._loop, self._loop.found, self._loop.impacts.get(0)
         counts, cells = loop.fired
-        self._objects.note(found.tracks[0, : found.counts[0]], found.behind(0))
+        self._note(found.tracks[0, : found.counts[0]], found.behind(0))
         columns: Iterable[np.ndarray] = records
         told: dict[str, Any] = {
             name: column.item() for name, column in zip(Records._fields, columns, strict=True)
@@ -128,23 +124,6 @@ class OneWorld:
         bodies: Integers = self._loop.arrived.objects[0, : len(self.belief.detections)].copy()
         return bodies
 
-    def true_boxes(self, tracks: Tracks) -> Floats:
-        """(n, 7) where the objects behind forecasts are now, in the sensor frame; a track without
-        an object keeps its forecast. Truth: for the privileged alone.
-        """
-        return self._objects.boxes(
-            tracks,
-            lambda bodies: dict(
-                zip(bodies, self._local_boxes(np.array(bodies, np.int64)), strict=True)
-            ),
-        )
-
-    def true_objects(self, tracks: Tracks) -> Integers:
-        """(n,) the bodies behind tracks, NO_OBJECT for a track without one. Truth: for training and
-        scoring alone.
-        """
-        return self._objects.behind(tracks)
-
     def bodies_behind_cells(self) -> Integers:
         """(N,) the body that every cell would return from now, NO_BODY for none. Truth: for
         training alone.
@@ -152,9 +131,7 @@ class OneWorld:
         return self._lidar.bodies(self.sensor)
 
     def full_scan(self) -> Scan:
-        """Return the scan of all cells now, before noise and dropout. Truth: for the privileged
-        alone.
-        """
+        """See `TrueLoop.full_scan`."""
         return self._lidar.peek(self.sensor)
 
     def would_detect(self, body: int) -> bool:
@@ -162,12 +139,6 @@ class OneWorld:
         the detector. Truth: for rewards alone.
         """
         return bool(self._loop.would_detect(np.array([body]), _HERE)[0])
-
-    def detectable(self) -> bool:
-        """Whether `would_detect` holds of the first-sighting actor, if perception reports it.
-        Truth: for the reward alone.
-        """
-        return bool(self._loop.detectable(_HERE)[0])
 
     def shows(self, body: int) -> bool:
         """Whether a camera shows enough of a body for a box. Truth: for scoring and people."""
@@ -179,7 +150,7 @@ class OneWorld:
         """
         world, taken = self.world, cameras or self.rig.cameras
         labels, engine = world.labels(), self._loop.conditions.engine
-        boxes = self._local_boxes(np.array([*labels], np.int64))
+        boxes = self._local_boxes([*labels])
         drawn = make_engine(engine, world.bullet, self.rig.grid), taken, self.sensor, boxes
         return faultless_detections(photographed(*drawn), labels)
 
@@ -194,5 +165,8 @@ class OneWorld:
         given = self.world, self.rig, self._loop.conditions, _NO_FAULT
         return self._loop.scanning.lidar(0) or lidar_of(*given)
 
-    def _local_boxes(self, bodies: Integers) -> Floats:
-        return self.sensor.boxes_to_local(self._loop.state.bodies.boxes[0, bodies])
+    def _present(self, objects: Sequence[int]) -> dict[int, Floats]:
+        return dict(zip(objects, self._local_boxes(objects), strict=True))
+
+    def _local_boxes(self, bodies: Sequence[int]) -> Floats:
+        return self.sensor.boxes_to_local(self._loop.state.bodies.boxes[0, [*bodies]])

@@ -2,6 +2,7 @@
 react.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -14,13 +15,13 @@ from care_sim.core.belief import Belief
 from care_sim.core.conditions import COMING, Sensing
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
-from care_sim.core.types import Detections, Scan, Tracks
+from care_sim.core.types import Detections, Scan
 from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.film import Film, Shot
 from care_sim.loops.gathering import acted_on, gather_sweeps
 from care_sim.loops.givens import Given, givens_of
 from care_sim.loops.observation_limits import Limits
-from care_sim.loops.truth import Told, TrackObjects, told_by
+from care_sim.loops.truth import Told, TrueLoop, told_by
 from care_sim.perception.points_only import Detector
 from care_sim.perception.tracker import MemoryRules, TrackMemory
 from care_sim.sensors.annotated import NO_RETURNS, Cloud
@@ -44,14 +45,12 @@ class OpenLoopKeyframe:
     velocities: Floats
 
 
-class OpenLoop:
+class OpenLoop(TrueLoop):
     """A film, the sensors and the car's software over its keyframes.
 
     Its attributes are of the coming keyframe: they change with every call of `keyframe`.
     """
 
-    index: int
-    """The number of the coming keyframe, from 0."""
     belief: Belief
     """All that a policy may know when it chooses the cells."""
     told: Told
@@ -72,6 +71,7 @@ class OpenLoop:
         seeds: SensorSeeds,
         detector: Detector,
     ):
+        super().__init__()
         self.film = film
         self.rig = rig
         self._lidar = RecordedLidar(rig.grid, sensing, seeds.lidar)
@@ -79,11 +79,9 @@ class OpenLoop:
         self._limits = Limits(rig)
         followed = MemoryRules(velocity_keyframes=sensing.velocity_keyframes)
         self._memory = TrackMemory(film.keyframe_s, followed)
-        self._track_objects = TrackObjects()
         self._sweep_mask = sensing.sweep_mask
         self._givens = givens_of(film, sensing, seeds)
         self._held: Cells = np.empty(0, np.int64)
-        self.index = 0
         self.told = {}
         self.handed = NO_RETURNS
         self.last_ranges = np.zeros(rig.grid.shape, np.float32)
@@ -119,7 +117,7 @@ class OpenLoop:
         detections = reported if sure.all() else reported.take(sure)
         taken_for = self._given.taken_for
         tracks = self._memory.update(detections, taken_for)
-        self._track_objects.note(tracks, objects[sure])
+        self._note(tracks, objects[sure])
         velocities = reported.velocities
         if velocities is None:
             velocities = np.zeros((len(reported), 2))
@@ -133,24 +131,6 @@ class OpenLoop:
             self._look(self.last_ranges)
         return OpenLoopKeyframe(index, fired, detections, reported, velocities)
 
-    def true_boxes(self, tracks: Tracks) -> Floats:
-        """(n, 7) where the objects behind forecasts are now, in the sensor frame; a track without
-        an object, or whose object is not annotated now, keeps its forecast. Truth: for the
-        privileged alone.
-        """
-        annotations = self.shot.annotations
-        present = dict(zip(annotations.objects.tolist(), annotations.boxes, strict=True))
-        return self._track_objects.boxes(
-            tracks, lambda numbers: {n: present[n] for n in numbers if n in present}
-        )
-
-    def true_objects(self, tracks: Tracks) -> Integers:
-        """(n,) the numbers of the objects behind tracks, NO_OBJECT for a track without one.
-
-        Truth: for training and scoring alone.
-        """
-        return self._track_objects.behind(tracks)
-
     def true_detected_objects(self) -> Integers:
         """(n,) the numbers of the objects behind the camera detections of the belief, NO_OBJECT for
         a false box.
@@ -161,12 +141,14 @@ class OpenLoop:
         return arrived.objects[self._limits.kept_detections(arrived.detections)]
 
     def full_scan(self) -> Scan:
-        """Return the scan of all cells now, before noise and dropout. Truth: for the privileged
-        alone.
-        """
+        """See `TrueLoop.full_scan`."""
         return Scan(
             np.arange(self.rig.grid.size), self._lidar.ranges(self._lidar.peek(self.shot.cloud))
         )
+
+    def _present(self, objects: Sequence[int]) -> dict[int, Floats]:
+        annotations = self.shot.annotations
+        return dict(zip(annotations.objects.tolist(), annotations.boxes, strict=True))
 
     @property
     def _given(self) -> Given:

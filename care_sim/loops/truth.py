@@ -4,13 +4,13 @@ Truth is read from the running loop and never enters a `Belief`. Also the return
 ranges, for `info`.
 """
 
-from collections.abc import Callable
-from typing import Any, Protocol
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.belief import Belief
 from care_sim.core.grid import Cells
 from care_sim.core.types import Scan, Tracks
 from care_sim.sensors.annotated import NO_OBJECT
@@ -39,24 +39,50 @@ def told_by(
     }
 
 
-class Watchable(Protocol):
-    """The part of a loop that environments and privileged policies read, besides its keyframes."""
+class TrueLoop(ABC):
+    """The truth that either loop tells about its coming keyframe. The object behind a track is the
+    one that it was last detected on.
+    """
 
-    index: int
-    """The number of the coming keyframe, from 0."""
+    def __init__(self) -> None:
+        self.index = 0
+        """The number of the coming keyframe."""
+        self._objects: dict[int, int] = {}
 
-    @property
-    def belief(self) -> Belief:
-        """All that a policy may know when it chooses the cells."""
-        ...
+    @abstractmethod
+    def full_scan(self) -> Scan:
+        """Return the scan of all cells now, before noise and dropout. Truth: for the privileged
+        alone.
+        """
+
+    def true_objects(self, tracks: Tracks) -> Integers:
+        """(n,) the objects behind tracks, NO_OBJECT for a track without one. In the closed loop
+        these are bodies. Truth: for training and scoring alone.
+        """
+        objects = [self._objects.get(track, NO_OBJECT) for track in tracks.ids.tolist()]
+        return np.array(objects, np.int64)
 
     def true_boxes(self, tracks: Tracks) -> Floats:
-        """(n, 7) true boxes, in the sensor frame, of the objects behind forecasts."""
-        ...
+        """(n, 7) where the objects behind forecasts are now, in the sensor frame. A track without
+        an object, or whose object is nowhere now, keeps its forecast. Truth: for the privileged
+        alone.
+        """
+        # All objects are read at once: the closed loop reads their boxes off one table.
+        behind = self.true_objects(tracks).tolist()
+        present = self._present([number for number in behind if number != NO_OBJECT])
+        boxes = tracks.boxes.copy()
+        for row, number in enumerate(behind):
+            boxes[row] = present.get(number, boxes[row])
+        return boxes
 
-    def full_scan(self) -> Scan:
-        """Return the scan of all cells now, before noise and dropout."""
-        ...
+    @abstractmethod
+    def _present(self, objects: Sequence[int]) -> dict[int, Floats]:
+        """The present boxes of objects, in the sensor frame, without those that are nowhere."""
+
+    def _note(self, tracks: Integers, objects: Integers) -> None:
+        """The tracks with the ids `tracks` (n,) were detected on `objects` (n,)."""
+        # The last one counts: where the tracker changed its object, the truth changes with it.
+        self._objects.update(zip(tracks.tolist(), objects.tolist(), strict=True))
 
 
 class Truth:
@@ -87,34 +113,3 @@ class Truth:
         """Return the scan of all cells, before noise and dropout; `cells` ascend."""
         scan: Scan = self._env.loop.full_scan()
         return scan
-
-
-class TrackObjects:
-    """Which object is behind each track: the one that it was last detected on."""
-
-    def __init__(self) -> None:
-        self._objects: dict[int, int] = {}
-
-    def note(self, tracks: Integers, objects: Integers) -> None:
-        """The tracks with the ids `tracks` (n,) were detected on `objects` (n,)."""
-        # The last one counts: where the tracker changed its object, the truth changes with it.
-        self._objects.update(zip(tracks.tolist(), objects.tolist(), strict=True))
-
-    def behind(self, tracks: Tracks) -> Integers:
-        """(n,) the objects behind tracks, NO_OBJECT for a track without one."""
-        objects = [self._objects.get(track, NO_OBJECT) for track in tracks.ids.tolist()]
-        return np.array(objects, np.int64)
-
-    def boxes(self, tracks: Tracks, boxes_of: Callable[[list[int]], dict[int, Floats]]) -> Floats:
-        """(n, 7) where the objects behind forecasts are now; a track without one stays as forecast.
-
-        `boxes_of` gives the present sensor-frame boxes of objects, and leaves out those that are
-        nowhere.
-        """
-        # All objects are read at once: the closed loop reads their boxes off one table.
-        behind = self.behind(tracks).tolist()
-        present = boxes_of([number for number in behind if number != NO_OBJECT])
-        boxes = tracks.boxes.copy()
-        for row, number in enumerate(behind):
-            boxes[row] = present.get(number, boxes[row])
-        return boxes

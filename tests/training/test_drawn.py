@@ -252,7 +252,8 @@ def test_who_never_fires_misses_every_keyframe_at_which_a_full_scan_would_detect
     detectable = []
 
     def choose():
-        detectable.append(env.unwrapped.loop.detectable())
+        loop = env.unwrapped.loop
+        detectable.append(loop.would_detect(loop.world.first_sighting.body))
         return nothing
 
     rewards = played(env, choose)
