@@ -8,6 +8,12 @@ Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 
+def places(mask: Mask) -> list[int]:
+    """The places at which a mask is True, ascending."""
+    found: list[int] = np.flatnonzero(mask).tolist()
+    return found
+
+
 def filled(table: np.ndarray, world: int, rows: np.ndarray) -> np.ndarray:
     """The table (W, n, ...) with `rows` (k, ...) at the beginning of a world's; a longer table, if
     they need more room than there is.

@@ -17,6 +17,7 @@ from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, detector_o
 from care_sim.envs.worlds import Setting, Worlds
 from care_sim.loops.one_world import OneWorld
 from care_sim.loops.records import Keyframe
+from care_sim.loops.stages.state import ONE_WORLD
 from care_sim.perception.detectors import PROXY
 from care_sim.scenarios import make_scenario, scenario_class
 from care_sim.scenarios.base import Scenario
@@ -28,9 +29,6 @@ KEYFRAME_S = 0.1
 """Between two decisions, unless another time is given: a turn of a spinning LiDAR."""
 LONGEST_KEYFRAME_S = 1.0
 """In a longer keyframe a car at 30 km/h drives more than 8 m, past what it brakes for."""
-
-
-_HERE = np.ones(1, np.bool_)
 
 
 class ClosedLoopEnv(SensingEnv[OneWorld]):
@@ -219,13 +217,12 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
         Raises gymnasium.error.ResetNeeded before `reset`, after the end, and after an error or
         interrupt in the middle of a step.
         """
-        loop, worlds = self.loop, self._worlds
-        scores = self._taken(action)
+        fired, worlds = self._fired(action), self._worlds
         assert worlds is not None
         # An error leaves the world between two keyframes.
         self._over = True
-        stepped = worlds.step(worlds.fired(scores, _HERE), _HERE)
-        self.keyframes.append(loop.record(worlds.records))
+        stepped = worlds.step(fired, ONE_WORLD)
+        self.keyframes.append(self.loop.record(worlds.records))
         info = _first(stepped.columns) | stepped.single.get(0, {})
         terminated, truncated = bool(stepped.terminated[0]), bool(stepped.truncated[0])
         self._over = terminated or truncated

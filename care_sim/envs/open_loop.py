@@ -27,8 +27,6 @@ from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe, SceneKeyframe
 from care_sim.perception import matching
 from care_sim.perception.detectors import PROXY
 
-_HERE = np.ones(1, np.bool_)
-
 UNFILMED = ("camera_rotation_sigma_deg", "camera_position_sigma_m", "engine")
 """Conditions that a film cannot take on once it is made."""
 
@@ -154,7 +152,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         gymnasium.error.ResetNeeded before `reset` and after the end.
         """
         loop = self.loop
-        counts, cells = self._choice.fired(self._taken(action), _HERE, np.array([loop.index]))
+        counts, cells = self._fired(action)
         fired = cells[0, : counts[0]].copy()
         shot = loop.shot
         record = loop.keyframe(fired)

@@ -5,7 +5,6 @@ Each is at most 0, so that 0 is the best return there is.
 
 import math
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -116,7 +115,11 @@ class Rewards:
         )
         _earn(who, self._courses, told, self._measured, table)
         earned = dict(zip(REWARD_WEIGHTS, table, strict=True))
-        return weighted(self._weights, earned), earned
+        # Not `sum`, which adds floats in another way from Python 3.12 on.
+        total = np.zeros(len(who))
+        for name, values in earned.items():
+            total += self._weights[name] * values
+        return total, earned
 
 
 @compiled(brief=True)
@@ -149,13 +152,3 @@ def _earn(who: Mask, courses: Floats, told: Floats, measured: bool, table: Float
         table[3, w] = -1.0 if now[2] > 0 and not in_view > 0 else 0.0
         table[4, w] = -(lost - course[3] if measured else 0.0)
         course[0], course[1], course[BOUND], course[3] = in_view, detected, bound_m, lost
-
-
-def weighted(weights: Mapping[str, float], earned: Mapping[str, Floats]) -> Floats:
-    """The weighted sum (W,) of columns of terms."""
-    # Not `sum`, which adds floats in another way from Python 3.12 on.
-    total: Any = 0.0
-    for name, value in earned.items():
-        total = total + weights[name] * value
-    result: Floats = total
-    return result

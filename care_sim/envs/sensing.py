@@ -26,6 +26,7 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import Action
 from care_sim.loops.observation_limits import Limits
 from care_sim.loops.stages.choice import Choice, check_finite
+from care_sim.loops.stages.state import ONE_WORLD, Fired
 from care_sim.loops.truth import TrueLoop, Truth
 from care_sim.perception.detectors import CLUSTER, PROXY, check_detector, make_detector
 from care_sim.perception.points_only import Detector
@@ -44,8 +45,8 @@ def observation_space(rig: Rig) -> spaces.Space[Any]:
         {
             "ego": _box(limits.ego),
             "budget": spaces.Box(0.0, 1.0, (1,), np.float32),
-            "detections": _table(limits.detections, MAX_DETECTIONS),
-            "tracks": _table(limits.tracks, MAX_TRACKS),
+            "detections": _box(limits.detections, MAX_DETECTIONS),
+            "tracks": _box(limits.tracks, MAX_TRACKS),
             "ranges": spaces.Box(0.0, grid.range_m, grid.shape, np.float32),
         }
     )
@@ -72,13 +73,9 @@ def as_scores(action: NDArray[np.floating], shape: tuple[int, ...]) -> NDArray[n
     return scores
 
 
-def _box(bounds: Floats) -> spaces.Box:
-    low, high = (np.asarray(bound, np.float32) for bound in bounds)
-    return spaces.Box(low, high, dtype=np.float32)
-
-
-def _table(bounds: Floats, rows: int) -> spaces.Box:
-    low, high = (np.tile(np.asarray(bound, np.float32), (rows, 1)) for bound in bounds)
+def _box(bounds: Floats, *rows: int) -> spaces.Box:
+    """The space of numbers within `bounds` (2, k), or of so many rows of them."""
+    low, high = (np.tile(bound, (*rows, 1)).astype(np.float32) for bound in bounds)
     return spaces.Box(low, high, dtype=np.float32)
 
 
@@ -100,12 +97,11 @@ def detector_of(
         raise InvalidInput(f"detector_parameters must map names to values, got {shown(parameters)}")
     if name == PROXY and "min_returns" in (parameters or {}):
         raise InvalidInput("min_returns is a condition, give it without detector_parameters")
-    own: dict[str, object] = {}
-    if name == PROXY:
-        own = {"min_returns": conditions.min_returns}
-    elif name == CLUSTER:
-        own = {"grid": rig.grid}
-    return make_detector(name, rig.sensor_height_m, **own | dict(parameters or {}))
+    given: dict[str, dict[str, object]] = {
+        PROXY: {"min_returns": conditions.min_returns},
+        CLUSTER: {"grid": rig.grid},
+    }
+    return make_detector(name, rig.sensor_height_m, **given.get(name, {}) | dict(parameters or {}))
 
 
 Observed = dict[str, NDArray[np.float32]]
@@ -224,17 +220,20 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         self._running = loop
         self._over = False
 
-    def _taken(self, action: Action) -> NDArray[np.float32]:
-        """Take an action: its scores (1, E, A), as of one world of many.
+    def _fired(self, action: Action) -> Fired:
+        """Take an action: the cells that it fires, until the next call.
 
         Raises InvalidInput for an action of the wrong shape or with values that are not finite, and
         gymnasium.error.ResetNeeded before `reset` and after the end.
         """
+        keyframe = np.array([self.loop.index])
         if self._over:
             raise gymnasium.error.ResetNeeded("the episode is over: call reset()")
         # A copy, since the caller may write into an action once it is taken.
-        self.acted = checked_scores(action, self.rig.grid.shape).copy()
-        return self.acted[None]
+        scores = as_scores(action, self.rig.grid.shape).copy()
+        fired = self._choice.fired(scores[None], ONE_WORLD, keyframe)
+        self.acted = scores
+        return fired
 
     def would_fire(self, action: Action) -> Cells:
         """The cells, ascending, that an action would fire at the coming keyframe, which it leaves

@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 
 from care_sim.base.threads import ALONE, Threads
 from care_sim.base.times import LAST_BITS_S
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Integers, Mask, places
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.rig import Rig
 from care_sim.envs.reward import KEEP_CLEAR_M, Rewards
-from care_sim.envs.sensing import Observed
 from care_sim.evaluation.outcomes import drive_outcome_of, outcome_of
 from care_sim.loops.episode import Episode, EpisodeSeeds, most_keyframes
 from care_sim.loops.false_box_pools import pool_of_another_drive
@@ -106,8 +105,8 @@ class Worlds:
     into its row of `observed`.
 
     Unless `exact`, clearances that no reward needs are bounds (`Loop`); outcomes are exact.
-    Where all worlds fire equally many cells (`has_one_budget`), infos hold the cells as one array,
-    else as one array per world.
+    Where all worlds have one budget, infos hold the cells as one array, else as one array per
+    world.
     """
 
     records: Records
@@ -117,7 +116,6 @@ class Worlds:
         self,
         settings: Sequence[Setting],
         choice: Choice,
-        observed: Observed | None = None,
         exact: bool = True,
         threads: Threads = ALONE,
     ):
@@ -128,11 +126,11 @@ class Worlds:
         self._exact = exact
         rigs, conditions = [each.rig for each in settings], [each.conditions for each in settings]
         self._choice = choice
-        self.has_one_budget = len({rig.budget for rig in rigs}) == 1
+        self._has_one_budget = len({rig.budget for rig in rigs}) == 1
         duration_s = first.scenario.duration_s
         detectors = [each.detector for each in settings]
         exact_below_m = np.inf if exact else KEEP_CLEAR_M
-        given = detectors, observed, exact_below_m, threads
+        given = detectors, exact_below_m, threads
         self.loop = Loop(rigs, conditions, duration_s, *given)
         self.observed = self.loop.observed
         self._rewards = Rewards(first.weights, worlds)
@@ -170,7 +168,7 @@ class Worlds:
         stepped = self._played(fired, who)
         told = {
             world: {"fired": fired.cells[world, : fired.counts[world]]} | self.loop.told(world)
-            for world in _places(who)
+            for world in places(who)
         }
         if self._first.conditions.floor:
             return stepped._replace(columns=self._columns(told) | stepped.columns)
@@ -188,14 +186,14 @@ class Worlds:
         kinds: dict[str, type] = {"fired": np.int64}
         kinds |= {"intensities": np.float64} if conditions.shapes_beams else {}
         kinds |= {"times_s": np.float64} if conditions.lidar_sweep_s else {}
-        shape = (worlds, self._first.rig.budget) if self.has_one_budget else (worlds,)
+        shape = (worlds, self._first.rig.budget) if self._has_one_budget else (worlds,)
         columns: dict[str, NDArray[Any]] = {
-            name: np.zeros(shape, kind if self.has_one_budget else object)
+            name: np.zeros(shape, kind if self._has_one_budget else object)
             for name, kind in kinds.items()
         }
         for world, own in told.items():
             for name, column in columns.items():
-                column[world] = own[name] if self.has_one_budget else own[name].copy()
+                column[world] = own[name] if self._has_one_budget else own[name].copy()
         return columns
 
     def _played(self, fired: Fired, who: Mask) -> Stepped:
@@ -209,7 +207,7 @@ class Worlds:
         self.records = records = loop.keyframe(fired, who)
         self._history.note(keyframes, records)
         if self._is_drive:
-            for world in _places(who):
+            for world in places(who):
                 self._sights[world].append(loop.sights.get(world, ()))
 
         terminated = who & (~np.isnan(records.impact_speed_mps) | loop.motion.are_over(who))
@@ -218,7 +216,7 @@ class Worlds:
         rewards, earned = self._rewards.of(records, detectable, over, who)
         single: dict[int, dict[str, Any]] = {
             world: {"outcome": asdict(self._outcome(world, int(keyframes[world]) + 1))}
-            for world in _places(over)
+            for world in places(over)
         }
         columns: dict[str, Any] = {"braking": records.braking, "time_s": records.time_s}
         if first.scoring_info:
@@ -252,8 +250,3 @@ class Worlds:
             return result
         appeared = float(episode.time_s[episode.in_view.argmax()])
         return replace(result, clearance_m=self.loop.motion.settle(world, appeared))
-
-
-def _places(who: Mask) -> list[int]:
-    places: list[int] = np.flatnonzero(who).tolist()
-    return places

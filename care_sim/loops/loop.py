@@ -35,14 +35,16 @@ from care_sim.world.world import World
 
 class Loop:
     """W worlds, their sensors and the software of their cars, over episodes of up to `duration_s`
-    seconds. Observations are written into `observed`, arrays with a row per world. The `rigs` (W,)
-    differ at most in their budgets, the `conditions` (W,) in those of their cameras. Without
-    `detectors` (W,), or where all are None, the paper's proxy detects what enough rays hit.
+    seconds. The `rigs` (W,) differ at most in their budgets, the `conditions` (W,) in those of
+    their cameras. Without `detectors` (W,), or where all are None, the paper's proxy detects what
+    enough rays hit.
 
     Clearances of `exact_below_m` or more are bounds, as of `Motion.advance`; `motion.settle`
     returns the least of an episode. Scans and pictures are made on `threads`.
     """
 
+    observed: Observations
+    """Observations of the coming keyframe, arrays with a row per world."""
     fired: Fired
     """Cells fired at the last keyframe."""
     found: Found
@@ -58,14 +60,13 @@ class Loop:
         conditions: Sequence[ClosedLoopConditions],
         duration_s: float,
         detectors: Sequence[Detector | None] = (),
-        observed: Observations | None = None,
         exact_below_m: float = np.inf,
         threads: Threads = ALONE,
     ):
         worlds = len(rigs)
         self.rig = rig = rigs[0]
         self.conditions = common = conditions[0]
-        self.observed = room_for_observations(rig, worlds) if observed is None else observed
+        self.observed = room_for_observations(rig, worlds)
         self.state = state = State(worlds)
         limits = Limits(rig)
         self.locating = Locating(rig, common, limits.ego, state)
@@ -80,9 +81,7 @@ class Loop:
         self.sight = Seeing(rig, conditions, threads)
         self.observing = Observing(limits, np.array([each.budget for each in rigs]))
         self._in_view = np.zeros(worlds, np.bool_)
-        self._reads_worlds = (
-            not self.scanning.is_compiled or not self.sight.is_fast or not self._detecting.is_proxy
-        )
+        self._reads_worlds = not (self.scanning.is_compiled and self.sight.is_fast)
 
     def begin(self, episodes: Mapping[int, Episode]) -> None:
         """Begin episodes, by the number of the world that each is played in."""

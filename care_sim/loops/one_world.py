@@ -18,7 +18,7 @@ from care_sim.loops.loop import Loop
 from care_sim.loops.records import Keyframe, Records
 from care_sim.loops.stages.scanning import lidar_of
 from care_sim.loops.stages.sight import photographed
-from care_sim.loops.stages.state import Fired
+from care_sim.loops.stages.state import ONE_WORLD, Fired
 from care_sim.loops.truth import TrueLoop
 from care_sim.perception.points_only import Detector
 from care_sim.sensors.annotated import IdentifiedDetections
@@ -28,7 +28,6 @@ from care_sim.sensors.lidar import Lidar
 from care_sim.sensors.pictures import faultless_detections
 from care_sim.world.world import World
 
-_HERE = np.ones(1, np.bool_)
 _NO_FAULT = np.random.SeedSequence(0)
 
 
@@ -64,7 +63,7 @@ class OneWorld(TrueLoop):
 
     def keyframe(self, fired: Cells) -> Keyframe:
         """Fire `fired`, act on what came back, and move on to the next keyframe."""
-        return self.record(self._loop.keyframe(Fired.of([fired]), _HERE))
+        return self.record(self._loop.keyframe(Fired.of([fired]), ONE_WORLD))
 
     def record(self, records: Records) -> Keyframe:
         """The record of the keyframe that the loop has played since."""
@@ -138,7 +137,7 @@ class OneWorld(TrueLoop):
         """Whether a scan of every cell would give a body the returns that the proxy needs, whatever
         the detector. Truth: for rewards alone.
         """
-        return bool(self._loop.would_detect(np.array([body]), _HERE)[0])
+        return bool(self._loop.would_detect(np.array([body]), ONE_WORLD)[0])
 
     def shows(self, body: int) -> bool:
         """Whether a camera shows enough of a body for a box. Truth: for scoring and people."""

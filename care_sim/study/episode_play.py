@@ -13,7 +13,6 @@ from typing import Any, NamedTuple, TypeVar, cast
 
 import gymnasium
 import numpy as np
-from gymnasium.vector.utils import create_empty_array
 from numpy.typing import ArrayLike, NDArray
 
 import care_sim
@@ -24,7 +23,7 @@ from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats
 from care_sim.core.conditions import DriverSettings
 from care_sim.envs.closed_loop import ClosedLoopEnv
-from care_sim.envs.sensing import Observed, as_scores
+from care_sim.envs.sensing import as_scores
 from care_sim.envs.worlds import Stepped, Worlds
 from care_sim.loops.one_world import OneWorld
 from care_sim.loops.records import Keyframe
@@ -235,14 +234,14 @@ def play_together(configs: Sequence[EpisodeConfig]) -> list[Row]:
         model = closed_loop(env)
         if "privileged" in tags_of(configs[0].policy):
             raise InvalidInput("a privileged policy asks its own world for the truth")
-        observed = cast(Observed, create_empty_array(model.observation_space, count))
         policy = vector_policy(partial(configs[0].make_policy, env), count)
         # A detector may remember something of its world.
         settings = [model.setting] * count
         if model.setting.detector is not None:
             settings = [closed_loop(config.make_env()).setting for config in configs]
         choice = Choice([setting.rig for setting in settings], model.conditions)
-        with closing(Worlds(settings, choice, observed, exact=False)) as worlds:
+        with closing(Worlds(settings, choice, exact=False)) as worlds:
+            observed = worlds.observed
             infos = worlds.begin({world: config.seed for world, config in enumerate(configs)})
             policy.reset()
             drawn = _common_draws()

@@ -6,14 +6,14 @@ from typing import Any, ClassVar
 import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space, create_empty_array
+from gymnasium.vector.utils import batch_space
 
 from care_sim.base.checks import as_array, check_flag, check_whole
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.limits import CORES
 from care_sim.base.threads import Threads
 from care_sim.base.vectors import shared_attribute
-from care_sim.core.arrays import Floats, Mask
+from care_sim.core.arrays import Floats, Mask, places
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action
@@ -103,14 +103,13 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
 
-        rows: Any = create_empty_array(self.single_observation_space, num_envs)
-        self._observed: Observed = rows
         settings = [model.setting for model in self._models]
         self.thread_pool = Threads(min(num_envs, threads))
         choice = Choice([one.rig for one in settings], self._model.conditions, self.thread_pool)
         # Infos without clearances need few of them.
         exact = self._model.scoring_info
-        self._worlds = Worlds(settings, choice, self._observed, exact, self.thread_pool)
+        self._worlds = Worlds(settings, choice, exact, self.thread_pool)
+        self._observed = self._worlds.observed
         # Each draws the seeds of its later episodes as the single environment does.
         self._seeded = [gymnasium.Env[Any, Any]() for _ in range(num_envs)]
         self._steps = np.zeros(num_envs, np.int64)
@@ -196,7 +195,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         begins = self._over.copy()
         if self.autoreset_mode == AutoresetMode.DISABLED and begins.any():
             raise gymnasium.error.ResetNeeded(
-                f"worlds {shown(_places(begins))} are over: call reset() with a reset_mask"
+                f"worlds {shown(places(begins))} are over: call reset() with a reset_mask"
             )
         scores = as_scores(as_array("actions", actions), self.action_space.shape or ())
         fired = self._worlds.fired(scores, ~begins)
@@ -242,7 +241,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         self._begun[who] = False
         # A task that is left would use up the random streams of the new episodes.
         self.thread_pool.settle()
-        own = {world: entropy_of(self._seeded[world], seeds[world]) for world in _places(who)}
+        own = {world: entropy_of(self._seeded[world], seeds[world]) for world in places(who)}
         for world, info in self._worlds.begin(own).items():
             infos = self._add_info(infos, info, world)
         self._over[who] = False
@@ -258,25 +257,10 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
                 infos = self._add_info(infos, info, world)
         return infos
 
-    def _add_info(
-        self, vector_infos: dict[str, Any], env_info: dict[str, Any], env_num: int
-    ) -> dict[str, Any]:
-        # Gymnasium takes all arrays of a name for equally long, unless their column is of objects.
-        if not self._worlds.has_one_budget:
-            for name, value in env_info.items():
-                if isinstance(value, np.ndarray):
-                    vector_infos.setdefault(name, np.full(self.num_envs, None, object))
-        return super()._add_info(vector_infos, env_info, env_num)
-
     def _handed_out(self) -> Observed:
         if not self.copy:
             return self._observed
         return {name: values.copy() for name, values in self._observed.items()}
-
-
-def _places(who: Mask) -> list[int]:
-    places: list[int] = np.flatnonzero(who).tolist()
-    return places
 
 
 def _many(single: type[ClosedLoopEnv]) -> type[ClosedLoopVectorEnv]:
