@@ -163,7 +163,7 @@ class Loop:
 
     def told(self, world: int) -> Told:
         """Return data of a world's last keyframe besides ranges."""
-        scan = self.scanning.scans[world]
+        scan = self.scanning.scans.get(world)
         if scan is None:
             return {}
         fired = self.fired.cells[world, : self.fired.counts[world]]

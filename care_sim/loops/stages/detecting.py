@@ -4,13 +4,13 @@ The paper's proxy (`care_sim.perception.proxy`) and the measured detectors
 (`care_sim.perception.measured`) detect in compiled code, any other detector world by world.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.base.threads import Threads
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Integers, Mask, places
 from care_sim.core.rig import Rig
 from care_sim.core.rows import copy_row
 from care_sim.core.types import Scan
@@ -33,8 +33,8 @@ class Detecting:
     parameters. Returned arrays are reused at the next keyframe.
     """
 
-    bodies: list[Integers]
-    """(W,) the bodies that a detector of one world found, by the scoring's match."""
+    bodies: dict[int, Integers]
+    """By world, the bodies that a detector of one world found, by the scoring's match."""
     detected: Mask
     """(W,) where the first-sighting actor is detected at the last keyframe."""
 
@@ -49,14 +49,14 @@ class Detecting:
         self._rigs = rigs
         self._makers = detectors
         self._least = min_returns
-        self._ones: list[_OneDetector | None] = [None] * worlds
+        self._ones: dict[int, _OneDetector] = {}
         self.is_proxy = all(one is None for one in detectors)
         """Whether all detect by the number of returns."""
         first, self._measured = detectors[0], None
         # A class with its own `begin` detects by what that returns.
         if isinstance(first, MeasuredDetector) and type(first).begin is MeasuredDetector.begin:
             self._measured = first.worlds(worlds, rigs[0], False, threads)
-        self.bodies = [np.empty(0, np.int64)] * worlds
+        self.bodies = {}
         self.detected = np.zeros(worlds, np.bool_)
         self._found = Found.of(worlds)
 
@@ -68,9 +68,9 @@ class Detecting:
         elif maker is not None:
             self._ones[world] = _OneDetector(self._rigs[world], maker, built, seeds.detector)
 
-    def detect(self, state: State, returns: Returns, scans: Sequence[Scan | None]) -> Found:
-        """The detections in the worlds that are live. `scans` (W,) are those of LiDARs that fire
-        world by world.
+    def detect(self, state: State, returns: Returns, scans: Mapping[int, Scan]) -> Found:
+        """The detections in the worlds that are live. `scans` are those of LiDARs that fire world
+        by world.
         """
         live, reported, found = state.live, state.reported, self._found
         counts, cells, ranges, ids = returns
@@ -89,15 +89,12 @@ class Detecting:
         self.detected = (is_used & (found.objects == state.egos.targets[:, None])).any(axis=1)
         return found
 
-    def _one_by_one(self, state: State, returns: Returns, scans: Sequence[Scan | None]) -> Found:
+    def _one_by_one(self, state: State, returns: Returns, scans: Mapping[int, Scan]) -> Found:
         told = {}
-        for world in np.flatnonzero(state.live).tolist():
-            one, count = self._ones[world], returns.counts[world]
-            assert one is not None
-            scan = scans[world] or Scan(
-                returns.cells[world, :count].copy(), returns.ranges[world, :count].copy()
-            )
-            told[world] = one.detect(state, world, scan, returns.ids[world, :count])
+        for world in places(state.live):
+            own = world, slice(returns.counts[world])
+            scan = scans.get(world) or Scan(returns.cells[own].copy(), returns.ranges[own].copy())
+            told[world] = self._ones[world].detect(state, world, scan, returns.ids[own])
         most = max((len(classes) for classes, *_ in told.values()), default=0)
         found = self._found = self._found.with_room(most)
         for world, (classes, boxes, behind, bodies) in told.items():
@@ -110,7 +107,7 @@ class Detecting:
 
     def bodies_found(self, found: Found, world: int) -> Integers:
         """(n,) all bodies that are detected in a world, and NO_OBJECT for a false box."""
-        return found.behind(world) if self._ones[world] is None else self.bodies[world]
+        return self.bodies[world] if world in self._ones else found.behind(world)
 
 
 class _OneDetector:

@@ -69,10 +69,10 @@ class Driving:
             np.zeros(worlds), np.zeros(worlds), np.zeros(worlds), np.zeros(worlds, np.bool_)
         )
         self._commands = np.zeros(worlds), np.zeros(worlds, np.bool_)
-        self._built: list[World | None] = [None] * worlds
+        self._built: dict[int, World] = {}
         self._special: set[int] = set()
-        self._humans: list[CarefulHuman | None] = [None] * worlds
-        self._cruising: list[Cruising | None] = [None] * worlds
+        self._humans: dict[int, CarefulHuman] = {}
+        self._cruising: dict[int, Cruising | None] = {}
 
     def begin(self, world: int, built: World) -> None:
         """Begin the episode of a world."""
@@ -102,9 +102,9 @@ class Driving:
         counts, rows = tracks
         found = {}
         for world in sorted(self._special.union(also)):
-            built = self._built[world]
-            if built is None or not state.live[world]:
+            if not state.live[world]:
                 continue
+            built = self._built[world]
             own = lying = Tracks.from_checked_rows(rows[world, : counts[world]].copy())
             if built.route is not None:
                 lying = along_route(own, built.route, state.driven.frame(world))
@@ -135,13 +135,13 @@ class Driving:
 
     def _own(self, world: int, ahead: Tracks, ego: Ego) -> tuple[float, bool]:
         """The command in a world, of its own driver and by its plan."""
-        human, cruising, built = self._humans[world], self._cruising[world], self._built[world]
+        human, cruising = self._humans.get(world), self._cruising[world]
         accelerations, braking = self._commands
         command = Command(float(accelerations[world]), bool(braking[world]))
         if human is not None:
             command = human.command(ahead, ego)
-        if cruising is not None and built is not None:
-            command = cruising.eased(command, ahead, ego.speed, built.along_m)
+        if cruising is not None:
+            command = cruising.eased(command, ahead, ego.speed, self._built[world].along_m)
         return command.acceleration, command.braking
 
 

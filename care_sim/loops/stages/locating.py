@@ -3,7 +3,7 @@
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Integers, Mask, places
 from care_sim.core.conditions import Sensing
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego
@@ -24,8 +24,8 @@ class Locating:
         x, y, z = map(float, rig.sensor_position)
         self._at, self._middle = (x, y, z), (x, 0.0, z)
         self._errs = bool(sensing.ego_position_sigma_m or sensing.ego_yaw_sigma_deg)
-        self._localisations: list[Localisation | None] = [None] * state.worlds
-        self._odometers: list[Odometry | None] = [None] * state.worlds
+        self._localisations: dict[int, Localisation] = {}
+        self._odometers: dict[int, Odometry] = {}
         # One table serves all three where nothing sets them apart.
         if self._errs:
             state.taken = state.driven = Sensors.of(state.worlds)
@@ -35,8 +35,9 @@ class Locating:
     def begin(self, world: int, seeds: SensorSeeds) -> None:
         """Begin the episode of a world."""
         if self._errs:
-            localisation = Localisation(self._sensing, self._rig.keyframe_s, seeds.odometry)
-            self._localisations[world] = localisation
+            self._localisations[world] = Localisation(
+                self._sensing, self._rig.keyframe_s, seeds.odometry
+            )
         if self._sensing.ego_speed_sigma:
             self._odometers[world] = Odometry(self._sensing.ego_speed_sigma, seeds.odometry)
 
@@ -51,25 +52,22 @@ class Locating:
         egos = state.egos
         moving = np.array([egos.speeds, egos.yaw_rates, egos.accelerations]).T
         if self._sensing.ego_speed_sigma:
-            for world in np.flatnonzero(state.live).tolist():
-                odometer = self._odometers[world]
-                assert odometer is not None
-                moving[world, 0] = odometer.reading(Ego(*moving[world].tolist())).speed
+            for world in places(state.live):
+                moved = Ego(*moving[world].tolist())
+                moving[world, 0] = self._odometers[world].reading(moved).speed
         np.clip(moving, *self._limits, out=state.read, where=state.live[:, None])
 
     def place(self, state: State, due: Mask) -> None:
         """Put the sensors of the worlds that are `due` where they are now, between keyframes."""
         place_sensors(state.sensors, state.bodies.boxes, state.egos.bodies, due, self._at)
-        for world in np.flatnonzero(due & self._errs).tolist():
-            localisation = self._localisations[world]
-            assert localisation is not None
-            state.taken.put(world, localisation.taken_for(state.sensors.frame(world)))
+        for world in places(due & self._errs):
+            taken_for = self._localisations[world].taken_for(state.sensors.frame(world))
+            state.taken.put(world, taken_for)
 
     def _err(self, state: State) -> None:
         """Put the sensors where the software takes them to be."""
-        for world in np.flatnonzero(state.live).tolist():
+        for world in places(state.live):
             localisation = self._localisations[world]
-            assert localisation is not None
             localisation.advance()
             if state.driven is not state.taken:
                 middle = state.driven.frame(world)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
 from care_sim.base.threads import Threads
-from care_sim.core.arrays import Floats, Integers, Mask, filled
+from care_sim.core.arrays import Floats, Integers, Mask, filled, places
 from care_sim.core.belief import lay_ranges
 from care_sim.core.cells.boxes import GridSpacing
 from care_sim.core.conditions import Sensing
@@ -61,8 +61,8 @@ class Scanning:
     keyframe.
     """
 
-    scans: list[Scan | None]
-    """(W,) of LiDARs that fire world by world, all that they measured at the last keyframe."""
+    scans: dict[int, Scan]
+    """By world, all that a LiDAR that fires alone measured at the last keyframe."""
 
     def __init__(self, rig: Rig, sensing: Sensing, worlds: int, threads: Threads):
         grid = rig.grid
@@ -82,8 +82,8 @@ class Scanning:
         if isinstance(grid, AngularGrid):
             self._fan = Fan(*grid.fan)
             self._spacing = grid.spacing
-        self._lidars: list[Lidar | None] = [None] * worlds
-        self.scans = [None] * worlds
+        self._lidars: dict[int, Lidar] = {}
+        self.scans = {}
         none = np.zeros(worlds, np.int64)
         empty = np.empty((worlds, 0), np.int64)
         self._returns = Returns(none, empty, np.empty((worlds, 0)), empty)
@@ -111,12 +111,11 @@ class Scanning:
         self._threads.share(_scan, live, *given)
 
     def _one_by_one(self, state: State, fired: Fired) -> Returns:
-        found: list[Integers] = [fired.counts] * state.worlds
+        found: dict[int, Integers] = {}
         self._threads.share(self._fire, state.live, state, fired, found)
         counts, cells, ranges, ids = self._returns
-        for world in np.flatnonzero(state.live).tolist():
+        for world in places(state.live):
             scan, bodies = self.scans[world], found[world]
-            assert scan is not None
             counts[world] = len(bodies)
             cells = filled(cells, world, scan.cells)
             ranges = filled(ranges, world, scan.ranges)
@@ -124,19 +123,17 @@ class Scanning:
         self._returns = Returns(counts, cells, ranges, ids)
         return self._returns
 
-    def _fire(self, live: Mask, state: State, fired: Fired, found: list[Integers]) -> None:
-        """Scan the worlds that are `live` (W,), and put the bodies of their returns into `found`
-        (W,).
+    def _fire(self, live: Mask, state: State, fired: Fired, found: dict[int, Integers]) -> None:
+        """Scan the worlds that are `live` (W,), and put the bodies of their returns into `found`,
+        by world.
         """
-        for world in np.flatnonzero(live).tolist():
-            lidar = self._lidars[world]
-            assert lidar is not None
-            asked = fired.cells[world, : fired.counts[world]]
-            self.scans[world], found[world] = lidar.fire(asked, state.sensors.frame(world))
+        for world in places(live):
+            given = fired.cells[world, : fired.counts[world]], state.sensors.frame(world)
+            self.scans[world], found[world] = self._lidars[world].fire(*given)
 
     def lidar(self, world: int) -> Lidar | None:
         """The LiDAR of a world that fires alone, else None."""
-        return self._lidars[world]
+        return self._lidars.get(world)
 
     def hits(self, state: State, live: Mask, bodies: Integers, asked: Fired) -> Integers:
         """(W,) how many of the cells `asked`, each fired once, would hit one of the `bodies` (W,)
@@ -144,12 +141,10 @@ class Scanning:
         """
         found = np.zeros(state.worlds, np.int64)
         if not self.is_compiled:
-            for world in np.flatnonzero(live & (asked.counts > 0)).tolist():
-                lidar = self._lidars[world]
-                assert lidar is not None
+            for world in places(live & (asked.counts > 0)):
                 cells = asked.cells[world, : asked.counts[world]]
-                sensor = state.sensors.frame(world)
-                found[world] = lidar.hits(int(bodies[world]), cells, sensor)
+                given = int(bodies[world]), cells, state.sensors.frame(world)
+                found[world] = self._lidars[world].hits(*given)
             return found
         ids = np.full(asked.cells.shape, NO_BODY)
         self._cast(state, live, asked, np.empty(ids.shape), ids)
