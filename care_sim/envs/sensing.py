@@ -16,7 +16,7 @@ from care_sim.base.checks import as_array, check_flag, check_seed
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.seeds import check_secret
 from care_sim.core.arrays import Floats
-from care_sim.core.belief import MAX_DETECTIONS, MAX_TRACKS, OBSERVED
+from care_sim.core.belief import MAX_DETECTIONS, MAX_TRACKS
 from care_sim.core.cells.stack import Grid
 from care_sim.core.conditions import MIN_RETURNS, Conditions
 from care_sim.core.firing.listing import hardware_of
@@ -288,9 +288,3 @@ def sensing(env: gymnasium.Env[Any, Any]) -> SensingEnv[Any]:
     if not (isinstance(env, gymnasium.Env) and isinstance(inner, SensingEnv)):
         raise InvalidInput(f"wrappers of CARE-Sim need one of its environments, got {shown(env)}")
     return inner
-
-
-def shows_belief(env: gymnasium.Env[Any, Any]) -> bool:
-    """Whether observations have the form of CARE-Sim's environments, whatever wrappers did."""
-    space = env.observation_space
-    return isinstance(space, spaces.Dict) and set(OBSERVED) <= set(space.keys())

@@ -15,24 +15,60 @@ from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.belief import OBSERVED, Observation
 from care_sim.core.beliefs import Beliefs
-from care_sim.envs.sensing import sensing, shows_belief
+from care_sim.core.rig import Rig
+from care_sim.envs.sensing import sensing
 from care_sim.envs.wrappers.reading import (
     AnyVector,
     Reading,
     ReadsBeliefs,
     WorldsWrapper,
-    read_one,
     reading_of,
     rig_of,
-    shows_beliefs,
+    shows_belief,
 )
 from care_sim.policies.learned.grid_features import EGO_INPUTS, GridFeatures
 
 GridArrays = dict[str, NDArray[np.float32]]
 
 
+class _Pictures(ReadsBeliefs):
+    """Beliefs as pictures, those of an environment or of the worlds of a vector."""
+
+    def _lay(
+        self,
+        env: gymnasium.Env[Any, Any] | AnyVector,
+        rig: Rig,
+        columns: int,
+        rows: int,
+        pictures: bool,
+    ) -> spaces.Space[Any]:
+        """Lay the blocks of the pictures, and return the space of those of a world."""
+        check_flag("pictures", pictures)
+        if not shows_belief(env):
+            raise InvalidInput(
+                f"{type(self).__name__} needs the observation of CARE-Sim's environments, with "
+                f"{', '.join(OBSERVED)}; {shown(env)} shows another"
+            )
+        self.features = GridFeatures(rig, columns, rows)
+        # Nothing stands between it and a wrapper that it is put around at once.
+        self.reading = Reading(env, rig, reading_of(env))
+        shape = self.features.shape
+        self._shape = shape if pictures else (int(np.prod(shape)),)
+        return spaces.Dict(
+            {
+                "grid": spaces.Box(0.0, 1.0, self._shape, np.float32),
+                "ego": spaces.Box(-1.0, 1.0, (len(EGO_INPUTS),), np.float32),
+            }
+        )
+
+    def _drawn(self, beliefs: Beliefs) -> GridArrays:
+        """Observations of W worlds, with pictures (W, ...)."""
+        told = self.features.of_all(beliefs)
+        return told | {"grid": told["grid"].reshape(-1, *self._shape)}
+
+
 class GridObservation(
-    gymnasium.ObservationWrapper[GridArrays, Any, Any], RecordConstructorArgs, ReadsBeliefs
+    _Pictures, gymnasium.ObservationWrapper[GridArrays, Any, Any], RecordConstructorArgs
 ):
     """Shows the belief as coarse pictures of the angular grid, and the car's own motion.
 
@@ -92,49 +128,18 @@ class GridObservation(
         rows: int = 8,
         pictures: bool = False,
     ):
-        check_flag("pictures", pictures)
-        rig = sensing(env).rig
-        if not shows_belief(env):
-            raise InvalidInput(
-                "GridObservation needs the observation of CARE-Sim's environments, with "
-                f"{', '.join(OBSERVED)}; {shown(env)} shows another"
-            )
-        self.features = GridFeatures(rig, columns, rows)
-        # Nothing stands between it and a wrapper that it is put around at once.
-        self.reading = Reading(rig, read_one, reading_of(env))
+        space = self._lay(env, sensing(env).rig, columns, rows, pictures)
         RecordConstructorArgs.__init__(self, columns=columns, rows=rows, pictures=pictures)
         gymnasium.ObservationWrapper.__init__(self, env)
-        self._shape = grid_shape(self.features, pictures)
-        self.observation_space = grid_space(self._shape)
+        self.observation_space = space
 
     def observation(self, observation: Observation) -> GridArrays:
         """The pictures of the observation that was given. Raises InvalidInput for another form."""
         self.reading.take(observation)
-        told = shaped(self.features.of_all(self.reading.beliefs), self._shape)
-        return {name: rows[0] for name, rows in told.items()}
+        return {name: rows[0] for name, rows in self._drawn(self.reading.beliefs).items()}
 
 
-def grid_shape(features: GridFeatures, pictures: bool) -> tuple[int, ...]:
-    """The pictures of a world: three dimensions, or all in one."""
-    return features.shape if pictures else (int(np.prod(features.shape)),)
-
-
-def shaped(told: GridArrays, shape: tuple[int, ...]) -> GridArrays:
-    """Observations of W worlds, with pictures (W, *shape)."""
-    return told | {"grid": told["grid"].reshape(-1, *shape)}
-
-
-def grid_space(shape: tuple[int, ...]) -> spaces.Space[Any]:
-    """The space of pictures of that shape and of the motion of a world."""
-    return spaces.Dict(
-        {
-            "grid": spaces.Box(0.0, 1.0, shape, np.float32),
-            "ego": spaces.Box(-1.0, 1.0, (len(EGO_INPUTS),), np.float32),
-        }
-    )
-
-
-class VectorGridObservation(WorldsWrapper, ReadsBeliefs):
+class VectorGridObservation(_Pictures, WorldsWrapper):
     """`GridObservation` over a vector environment: what it shows of a world is what
     `GridObservation` shows of the single environment, to the last bit.
 
@@ -157,19 +162,9 @@ class VectorGridObservation(WorldsWrapper, ReadsBeliefs):
     single = GridObservation
 
     def __init__(self, env: AnyVector, columns: int = 64, rows: int = 8, pictures: bool = False):
-        check_flag("pictures", pictures)
         self._rig = rig_of(env)
-        if not shows_beliefs(env):
-            raise InvalidInput(
-                "VectorGridObservation needs the observation of CARE-Sim's environments, with "
-                f"{', '.join(OBSERVED)}; {shown(env)} shows another"
-            )
-        super().__init__(env)
-        self.features = GridFeatures(self._rig, columns, rows)
-        # Nothing stands between it and a wrapper that it is put around at once.
-        self.reading = Reading(self._rig, Beliefs.from_observation, reading_of(env))
-        self._shape = grid_shape(self.features, pictures)
-        self.single_observation_space = grid_space(self._shape)
+        WorldsWrapper.__init__(self, env)
+        self.single_observation_space = self._lay(env, self._rig, columns, rows, pictures)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
 
     def reset(
@@ -188,14 +183,13 @@ class VectorGridObservation(WorldsWrapper, ReadsBeliefs):
 
     def _shown(self, observation: Observation) -> GridArrays:
         self.reading.take(observation)
-        return shaped(self.features.of_all(self.reading.beliefs), self._shape)
+        return self._drawn(self.reading.beliefs)
 
     def _finals(self, given: Sequence[Any]) -> NDArray[np.object_]:
         """(W,) pictures of the last observations of those worlds that have one, else None."""
         over = [world for world, last in enumerate(given) if last is not None]
         stacked = {name: np.stack([given[world][name] for world in over]) for name in OBSERVED}
-        last = Beliefs.from_observation(stacked, self._rig)
-        drawn = shaped(self.features.of_all(last), self._shape)
+        drawn = self._drawn(Beliefs.from_observation(stacked, self._rig))
         finals = np.full(len(given), None, object)
         for row, world in enumerate(over):
             finals[world] = {name: rows[row] for name, rows in drawn.items()}

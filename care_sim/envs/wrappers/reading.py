@@ -1,6 +1,5 @@
 """The settings of a wrapped environment, and its observation, read once for all wrappers."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -49,25 +48,25 @@ def rig_of(env: AnyVector) -> Rig:
     return largest
 
 
-def shows_beliefs(env: AnyVector) -> bool:
-    """Whether observations have the form of CARE-Sim's environments, whatever wrappers did."""
-    space = env.single_observation_space
+def shows_belief(env: gymnasium.Env[Any, Any] | AnyVector) -> bool:
+    """Whether observations, of a vector those of each world, have the form of CARE-Sim's
+    environments, whatever wrappers did.
+    """
+    space = env.single_observation_space if isinstance(env, VectorEnv) else env.observation_space
     return isinstance(space, spaces.Dict) and set(OBSERVED) <= set(space.keys())
 
 
 class Reading:
-    """The beliefs of the observation that a wrapper was last given: `read` with its rig, or, where
-    a wrapper `inside` was given the very same, those that are read already.
+    """The beliefs of the observation that a wrapper of `env`, an environment or a vector, was last
+    given: read with its rig, or, where a wrapper `inside` was given the very same, those that are
+    read already.
     """
 
     def __init__(
-        self,
-        rig: Rig,
-        read: Callable[[Observation, Rig], Beliefs],
-        inside: "Reading | None" = None,
+        self, env: gymnasium.Env[Any, Any] | AnyVector, rig: Rig, inside: "Reading | None"
     ):
         self._rig = rig
-        self._read = read
+        self._read = Beliefs.from_observation if isinstance(env, VectorEnv) else _read_one
         self._inside = inside
         self._beliefs: Beliefs | None = None
 
@@ -92,7 +91,7 @@ class ReadsBeliefs:
     reading: Reading
 
 
-def read_one(observation: Observation, rig: Rig) -> Beliefs:
+def _read_one(observation: Observation, rig: Rig) -> Beliefs:
     """The beliefs of the one world of a single environment."""
     return Beliefs.of(rig.read(observation), rig)
 

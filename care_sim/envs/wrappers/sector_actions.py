@@ -1,6 +1,6 @@
 """Actions of a few numbers instead of one per cell: scores of azimuth x elevation sectors."""
 
-from typing import Any, SupportsFloat
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -10,36 +10,88 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from care_sim.base.vectors import attribute_of_each
-from care_sim.core.arrays import Floats, Mask
-from care_sim.core.beliefs import Beliefs
+from care_sim.core.rig import Rig
 from care_sim.core.types import Action
-from care_sim.envs.sensing import checked_scores, sensing, shows_belief
+from care_sim.envs.sensing import checked_scores, sensing
 from care_sim.envs.wrappers.reading import (
     AnyVector,
     Reading,
     ReadsBeliefs,
     WorldsWrapper,
-    read_one,
     reading_inside,
     rig_of,
-    shows_beliefs,
+    shows_belief,
 )
 from care_sim.policies.learned.sectors import SectorActions, Tiling
 
 
-class _Sectors(gymnasium.ActionWrapper[Any, NDArray[np.float32], Action], RecordConstructorArgs):
-    """One score per sector, from -1 to 1: the range that learners are made for."""
+class _Sectors:
+    """One score per sector and world, from -1 to 1: the range that learners are made for."""
+
+    env: Any
+
+    def _lay(
+        self, rig: Rig, budgets: list[int], azimuths: int, elevations: int
+    ) -> spaces.Space[Any]:
+        """Lay the sectors of worlds with these budgets, and return the space of their scores."""
+        self._rig = rig
+        self.sectors = Tiling(rig.grid, azimuths, elevations)
+        self._fired = SectorActions(rig, self.sectors, np.array(budgets))
+        return spaces.Box(-1.0, 1.0, self.sectors.shape, np.float32)
+
+    def action(self, action: NDArray[np.float32]) -> Action:
+        """Scores of the cells that the shared allocator takes."""
+        raise NotImplementedError
+
+    def _cells(self, scores: NDArray[np.float32]) -> Action:
+        """Scores (W, E, A) of the cells that the shared allocator takes, until the next call."""
+        return self._fired.alone(scores)
+
+
+class _Reserve(_Sectors, ReadsBeliefs):
+    """Scores that rank the sectors for the reserve, beside the hulls of the forecasts."""
+
+    def _read(self, env: gymnasium.Env[Any, Any] | AnyVector) -> None:
+        inside = None if shows_belief(env) else reading_inside(env, type(self).__name__)
+        self.reading = Reading(env, self._rig, inside)
+
+    def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> Any:
+        """Begin an episode, in a vector one in every world."""
+        answer = self.env.reset(seed=seed, options=options)
+        self.reading.take(answer[0])
+        return answer
+
+    def step(self, action: NDArray[np.float32]) -> Any:
+        """Fire the scores that `action` makes and advance to the next keyframe."""
+        answer = self.env.step(self.action(action))
+        self.reading.take(answer[0])
+        return answer
+
+    def _cells(self, scores: NDArray[np.float32]) -> Action:
+        return self._fired.reserve(self.reading.beliefs, scores)
+
+
+class _SingleSectors(
+    _Sectors, gymnasium.ActionWrapper[Any, NDArray[np.float32], Action], RecordConstructorArgs
+):
+    """Scores of the sectors of an environment."""
 
     def __init__(self, env: gymnasium.Env[Any, Any], azimuths: int = 32, elevations: int = 4):
-        self._rig = sensing(env).rig
-        self.sectors = Tiling(self._rig.grid, azimuths, elevations)
-        self._fired = SectorActions(self._rig, self.sectors, np.array([self._rig.budget]))
+        rig = sensing(env).rig
+        space = self._lay(rig, [rig.budget], azimuths, elevations)
         RecordConstructorArgs.__init__(self, azimuths=azimuths, elevations=elevations)
         gymnasium.ActionWrapper.__init__(self, env)
-        self.action_space = sectors_space(self.sectors)
+        self.action_space = space
+
+    def action(self, action: NDArray[np.float32]) -> Action:
+        """Scores (E, A) of the cells that the shared allocator takes."""
+        scores = checked_scores(action, self.sectors.shape)
+        # A copy: the caller may keep it.
+        cells: Action = self._cells(scores[None])[0].copy()
+        return cells
 
 
-class SectorReserve(_Sectors, ReadsBeliefs):
+class SectorReserve(_Reserve, _SingleSectors):
     """The action ranks sectors for the reserve.
 
     Exploitation and floor stay those of the shared allocator, so a learner competes with the rules
@@ -84,34 +136,10 @@ class SectorReserve(_Sectors, ReadsBeliefs):
 
     def __init__(self, env: gymnasium.Env[Any, Any], azimuths: int = 32, elevations: int = 4):
         super().__init__(env, azimuths, elevations)
-        inside = None if shows_belief(env) else reading_inside(env, "SectorReserve")
-        self.reading = Reading(self._rig, read_one, inside)
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode."""
-        observation, info = super().reset(seed=seed, options=options)
-        self.reading.take(observation)
-        return observation, info
-
-    def step(
-        self, action: NDArray[np.float32]
-    ) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
-        """Fire the scores that `action` makes and advance to the next keyframe."""
-        answer = super().step(action)
-        self.reading.take(answer[0])
-        return answer
-
-    def action(self, action: NDArray[np.float32]) -> Action:
-        """Scores (E, A) of the cells that the shared allocator takes."""
-        scores = checked_scores(action, self.sectors.shape)
-        # A copy: the caller may keep it.
-        cells: Action = self._fired.reserve(self.reading.beliefs, scores[None])[0].copy()
-        return cells
+        self._read(env)
 
 
-class SectorScores(_Sectors):
+class SectorScores(_SingleSectors):
     """The action scores everything: sectors are fired whole, best first, up to the budget.
 
     ### Action
@@ -139,43 +167,29 @@ class SectorScores(_Sectors):
     ```
     """
 
-    def action(self, action: NDArray[np.float32]) -> Action:
-        """Scores (E, A) of the cells that the shared allocator takes."""
-        scores = checked_scores(action, self.sectors.shape)
-        cells: Action = self._fired.alone(scores[None])[0].copy()
-        return cells
 
-
-def sectors_space(sectors: Tiling) -> spaces.Space[Any]:
-    """The space of one score per sector."""
-    return spaces.Box(-1.0, 1.0, sectors.shape, np.float32)
-
-
-class _VectorSectors(WorldsWrapper):
-    """One score per world and sector, from -1 to 1."""
+class _VectorSectors(_Sectors, WorldsWrapper):
+    """Scores of the sectors of every world."""
 
     def __init__(self, env: AnyVector, azimuths: int = 32, elevations: int = 4):
-        self._rig = rig_of(env)
-        super().__init__(env)
-        budgets = np.array([rig.budget for rig in attribute_of_each(env, "rig")])
-        self.sectors = Tiling(self._rig.grid, azimuths, elevations)
-        self._fired = SectorActions(self._rig, self.sectors, budgets)
-        self.single_action_space = sectors_space(self.sectors)
+        rig = rig_of(env)
+        WorldsWrapper.__init__(self, env)
+        budgets = [each.budget for each in attribute_of_each(env, "rig")]
+        self.single_action_space = self._lay(rig, budgets, azimuths, elevations)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
-    def step(self, actions: NDArray[np.float32]) -> tuple[Any, Floats, Mask, Mask, dict[str, Any]]:
-        """Fire the cells of the scores `actions` (W, elevations, azimuths) and advance to the next
+    def action(self, action: NDArray[np.float32]) -> Action:
+        """Scores (W, E, A) of the cells that the shared allocator takes, until the next call."""
+        return self._cells(checked_scores(action, (self.num_envs, *self.sectors.shape)))
+
+    def step(self, action: NDArray[np.float32]) -> Any:
+        """Fire the cells of the scores `action` (W, elevations, azimuths) and advance to the next
         keyframe.
         """
-        scores = checked_scores(actions, (self.num_envs, *self.sectors.shape))
-        return self.env.step(self._cells(scores))
-
-    def _cells(self, scores: NDArray[np.float32]) -> Action:
-        """Scores (W, E, A) of the cells that the shared allocator takes, until the next call."""
-        raise NotImplementedError
+        return self.env.step(self.action(action))
 
 
-class VectorSectorReserve(_VectorSectors, ReadsBeliefs):
+class VectorSectorReserve(_Reserve, _VectorSectors):
     """`SectorReserve` over a vector environment: a world is the single environment behind
     `SectorReserve`, to the last bit.
 
@@ -196,25 +210,7 @@ class VectorSectorReserve(_VectorSectors, ReadsBeliefs):
 
     def __init__(self, env: AnyVector, azimuths: int = 32, elevations: int = 4):
         super().__init__(env, azimuths, elevations)
-        inside = None if shows_beliefs(env) else reading_inside(env, "VectorSectorReserve")
-        self.reading = Reading(self._rig, Beliefs.from_observation, inside)
-
-    def reset(
-        self, *, seed: Any = None, options: dict[str, Any] | None = None
-    ) -> tuple[Any, dict[str, Any]]:
-        """Begin episodes."""
-        observation, infos = self.env.reset(seed=seed, options=options)
-        self.reading.take(observation)
-        return observation, infos
-
-    def step(self, actions: NDArray[np.float32]) -> tuple[Any, Floats, Mask, Mask, dict[str, Any]]:
-        """As `VectorSectorReserve` says."""
-        answer = super().step(actions)
-        self.reading.take(answer[0])
-        return answer
-
-    def _cells(self, scores: NDArray[np.float32]) -> Action:
-        return self._fired.reserve(self.reading.beliefs, scores)
+        self._read(env)
 
 
 class VectorSectorScores(_VectorSectors):
@@ -234,6 +230,3 @@ class VectorSectorScores(_VectorSectors):
     """
 
     single = SectorScores
-
-    def _cells(self, scores: NDArray[np.float32]) -> Action:
-        return self._fired.alone(scores)
