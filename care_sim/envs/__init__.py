@@ -44,18 +44,14 @@ def installed_ids() -> list[str]:
 def register_all() -> None:
     """Register every environment that is not registered yet."""
     # As strings: an environment and what it needs are imported when one is made.
-    for name, entry_point in IDS.items():
+    for name in [*IDS, *installed_ids()]:
         if name not in gymnasium.registry:
-            gymnasium.register(
-                name, entry_point=entry_point, vector_entry_point=_vector_of(entry_point)
-            )
-    for name in installed_ids():
-        if name not in gymnasium.registry:
+            entry_point = IDS.get(name, _ANY_SCENARIO)
             gymnasium.register(
                 name,
-                entry_point=_ANY_SCENARIO,
-                vector_entry_point=_vector_of(_ANY_SCENARIO),
-                kwargs={"scenario": name},
+                entry_point=entry_point,
+                vector_entry_point=_vector_of(entry_point),
+                kwargs={} if name in IDS else {"scenario": name},
             )
 
 

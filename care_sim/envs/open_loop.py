@@ -115,11 +115,14 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
 
     @property
     def last(self) -> SceneKeyframe:
-        """The last keyframe, with what it found. Truth: for scoring and people."""
-        record, seen = self.keyframes[-1], self._sightings
-        shot = self.loop.film.shots[record.index]
-        scored, appearing = seen.scored(record.index), seen.appearing(record.index)
-        return SceneKeyframe(shot.time_s, record, self._masks[-1], scored, appearing)
+        """The last keyframe, with what it found; before the first scan the coming one, without a
+        record. Truth: for scoring and people.
+        """
+        record = self.keyframes[-1] if self.keyframes else None
+        index, seen = record.index if record else 0, self._sightings
+        shot = self.loop.film.shots[index]
+        found = self._masks[-1] if record else np.zeros(len(shot.annotations), np.bool_)
+        return SceneKeyframe(shot.time_s, record, found, seen.scored(index), seen.appearing(index))
 
     def _start(self, film: Film, seed: int) -> tuple[Observed, dict[str, Any]]:
         """Begin an episode over a film.
@@ -187,13 +190,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
 
         if self.render_mode is None:
             return None
-        if self.keyframes:
-            shown = self.last
-        else:
-            shot, seen = self.loop.shot, self._sightings
-            nothing = np.zeros(len(shot.annotations), bool)
-            shown = SceneKeyframe(shot.time_s, None, nothing, seen.scored(0), seen.appearing(0))
-        return np.asarray(draw_keyframe(scene_view(self.loop, [shown])))
+        return np.asarray(draw_keyframe(scene_view(self.loop, [self.last])))
 
 
 class FilmEnv(OpenLoopEnv):

@@ -182,18 +182,13 @@ class Worlds:
         """Return the scan data `told` as columns: (W, B), or (W,) arrays of each world's own where
         budgets differ.
         """
-        conditions, worlds = self._first.conditions, len(self._settings)
-        kinds: dict[str, type] = {"fired": np.int64}
-        kinds |= {"intensities": np.float64} if conditions.shapes_beams else {}
-        kinds |= {"times_s": np.float64} if conditions.lidar_sweep_s else {}
-        shape = (worlds, self._first.rig.budget) if self._has_one_budget else (worlds,)
-        columns: dict[str, NDArray[Any]] = {
-            name: np.zeros(shape, kind if self._has_one_budget else object)
-            for name, kind in kinds.items()
-        }
+        columns: dict[str, NDArray[Any]] = {}
         for world, own in told.items():
-            for name, column in columns.items():
-                column[world] = own[name] if self._has_one_budget else own[name].copy()
+            for name, values in own.items():
+                shape, kind = (values.shape, values.dtype) if self._has_one_budget else ((), object)
+                if name not in columns:
+                    columns[name] = np.zeros((len(self._settings), *shape), kind)
+                columns[name][world] = values.copy()
         return columns
 
     def _played(self, fired: Fired, who: Mask) -> Stepped:

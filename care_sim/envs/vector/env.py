@@ -31,7 +31,6 @@ from care_sim.envs.vector.arguments import (
 )
 from care_sim.envs.worlds import Stepped, Worlds
 from care_sim.loops.stages.choice import Choice
-from care_sim.scenarios.base import Scenario
 
 WORLDS_A_THREAD = 32
 """Fewest worlds per thread: with fewer, the overhead of a thread exceeds its gain."""
@@ -123,20 +122,10 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         return rig
 
     @property
-    def scenario(self) -> Scenario:
-        """The scenario of all worlds."""
-        return self._model.scenario
-
-    @property
     def conditions(self) -> ClosedLoopConditions:
         """The conditions of all worlds. Raises InvalidInput where cameras differ."""
         conditions: ClosedLoopConditions = shared_attribute(self, "conditions")
         return conditions
-
-    @property
-    def min_returns(self) -> int:
-        """See `care_sim.envs.sensing.SensingEnv.min_returns`."""
-        return self._model.min_returns
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
         """An attribute of each world (W,), as of Gymnasium's own vectors: `rig`, `conditions`, or
