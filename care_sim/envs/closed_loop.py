@@ -184,11 +184,6 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
         return self.setting.scenario
 
     @property
-    def conditions(self) -> ClosedLoopConditions:
-        """The conditions."""
-        return self.setting.conditions
-
-    @property
     def reward_weights(self) -> Mapping[str, float]:
         """The weight of every term of the reward."""
         return self.setting.weights

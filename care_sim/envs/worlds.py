@@ -17,7 +17,7 @@ from care_sim.evaluation.outcomes import drive_outcome_of, outcome_of
 from care_sim.loops.episode import Episode, EpisodeSeeds, most_keyframes
 from care_sim.loops.false_box_pools import pool_of_another_drive
 from care_sim.loops.loop import Loop
-from care_sim.loops.records import Outcome, Records, Sight, kind_of
+from care_sim.loops.records import Outcome, Records, Sight
 from care_sim.loops.stages.choice import Choice
 from care_sim.loops.stages.state import Fired
 from care_sim.perception.points_only import Detector
@@ -76,14 +76,8 @@ class History:
         self._table[keyframes, self._all] = np.array(records, float).T
 
     def episode(self, world: int, keyframes: int) -> Records:
-        """The first `keyframes` records of a world's episode, (keyframes,) each."""
-        columns = self._table[:keyframes, world].T
-        return Records(
-            *(
-                column.astype(kind_of(name))
-                for name, column in zip(Records._fields, columns, strict=True)
-            )
-        )
+        """The first `keyframes` records of a world's episode, (keyframes,) floats each."""
+        return Records(*self._table[:keyframes, world].T)
 
 
 class Stepped(NamedTuple):

@@ -46,15 +46,6 @@ def outcome_of(records: Records, impact: Impact | None) -> Outcome:
     )
 
 
-def drive_outcome(
-    keyframes: Sequence[Keyframe], meetings: Sequence[Meeting], progress: float
-) -> DriveOutcome:
-    """The result of a drive with `meetings`, after a share `progress` of its way."""
-    sights = [record.sights for record in keyframes]
-    impact = keyframes[-1].impact
-    return drive_outcome_of(Records.of(keyframes), impact, sights, meetings, progress)
-
-
 def drive_outcome_of(
     records: Records,
     impact: Impact | None,
@@ -62,7 +53,9 @@ def drive_outcome_of(
     meetings: Sequence[Meeting],
     progress: float,
 ) -> DriveOutcome:
-    """`drive_outcome` of columns and of the `sights` of each keyframe; see `outcome_of`."""
+    """The result of a drive with `meetings`, after a share `progress` of its way. `sights` are
+    those of each keyframe, the others as in `outcome_of`.
+    """
     return DriveOutcome(
         **asdict(outcome_of(records, impact)),
         hit_standing=impact.speed_mps == 0.0 if impact else None,

@@ -57,13 +57,8 @@ class Limits:
     @cached_property
     def detections(self) -> Floats:
         """Bounds of `ImageDetections.COLUMNS`, over all cameras; class -1 pads."""
-        least, most = self._pictured
+        least, most = self.pictured
         return np.stack([np.r_[-1.0, least[1:]], most.max(axis=0)])
-
-    @property
-    def most_by_camera(self) -> Floats:
-        """(k, 9) the most of a detection of each camera."""
-        return self._pictured[1]
 
     @cached_property
     def tracks(self) -> Floats:
@@ -94,7 +89,7 @@ class Limits:
 
     def _fit(self, detections: ImageDetections) -> bool:
         """Whether nothing of the detections lies beyond the limits, so that all are shown."""
-        least, most = self._pictured
+        least, most = self.pictured
         rows = detections.rows()
         return len(rows) <= MAX_DETECTIONS and rows_within(rows, least, most[detections.cameras])
 
@@ -102,7 +97,7 @@ class Limits:
         """The rows of those that lie in the picture, and no more than the table holds."""
         # Looked at before clipping, which would leave of a box wholly outside a line on the edge.
         left, top, right, bottom = detections.boxes.T
-        width, height = self._pictured[1][detections.cameras, ImageDetections.BOX][:, 2:].T
+        width, height = self.pictured[1][detections.cameras, ImageDetections.BOX][:, 2:].T
         shown = (left < width) & (top < height) & (right > 0) & (bottom > 0)
         return np.flatnonzero(shown)[:MAX_DETECTIONS]
 
@@ -111,7 +106,7 @@ class Limits:
         return ego if (np.abs(values) <= _EGO).all() else Ego(*np.clip(values, *self.ego).tolist())
 
     @cached_property
-    def _pictured(self) -> tuple[Floats, Floats]:
+    def pictured(self) -> tuple[Floats, Floats]:
         """The least (9,) and for every camera the most (k, 9) of a detection."""
         cameras = self.rig.cameras
         last = max(len(cameras) - 1, 1)
@@ -123,7 +118,7 @@ class Limits:
         # Detections within the limits are returned as they are.
         if self._fit(detections):
             return detections
-        least, most = self._pictured
+        least, most = self.pictured
         rows = detections.rows().copy()
         yaw_change = ImageDetections.YAW_CHANGE
         rows[:, yaw_change] = _without_turns(rows[:, yaw_change])

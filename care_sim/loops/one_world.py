@@ -23,7 +23,6 @@ from care_sim.loops.truth import TrueLoop
 from care_sim.perception.points_only import Detector
 from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.engines import make_engine
-from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
 from care_sim.sensors.lidar import Lidar
 from care_sim.sensors.pictures import faultless_detections
 from care_sim.world.world import World
@@ -50,7 +49,6 @@ class OneWorld(TrueLoop):
         conditions: ClosedLoopConditions,
         seeds: SensorSeeds,
         duration_s: float,
-        pool: BoxPool = EMPTY_POOL,
         detector: Detector | None = None,
     ) -> "OneWorld":
         """An episode of up to `duration_s` seconds in a loop of its own. Without a `detector` the
@@ -58,7 +56,7 @@ class OneWorld(TrueLoop):
         """
         loop = Loop([rig], [conditions], duration_s, [detector])
         # The caller chooses the cells, so no floor is needed.
-        loop.begin({0: Episode(world, seeds, _NO_FAULT, pool)})
+        loop.begin({0: Episode(world, seeds, _NO_FAULT)})
         return cls(loop)
 
     def keyframe(self, fired: Cells) -> Keyframe:

@@ -184,12 +184,7 @@ class Records(NamedTuple):
         columns = {name: [getattr(one, name) for one in keyframes] for name in cls._fields}
         columns["fired"] = [len(one.fired) for one in keyframes]
         # None, where nothing was hit, becomes NaN.
-        return cls(**{name: np.array(columns[name], kind_of(name)) for name in cls._fields})
-
-
-def kind_of(column: str) -> type:
-    """Return the type of a column's numbers."""
-    kinds: dict[str, type] = {"fired": np.int64} | dict.fromkeys(
-        ("in_view", "detected", "braking", "needless", "unfounded"), np.bool_
-    )
-    return kinds.get(column, np.float64)
+        impacts = np.array(columns.pop("impact_speed_mps"), float)
+        return cls(
+            **{name: np.array(column) for name, column in columns.items()}, impact_speed_mps=impacts
+        )

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.evaluation.outcomes import collision_outcome, drive_outcome, outcome, score
-from care_sim.loops.records import Keyframe, Outcome, Sight
+from care_sim.evaluation.outcomes import collision_outcome, drive_outcome_of, outcome, score
+from care_sim.loops.records import Keyframe, Outcome, Records, Sight
 from care_sim.world.approach import Impact
 from care_sim.world.motions import Crosser, Meeting, Walk
 
@@ -110,6 +110,12 @@ FRAMES = [
     keyframe(2, [(28.0, True, True), (68.0, False, False)]),
     keyframe(3, [(27.0, True, True), (67.0, False, False)], needless=True),
 ]
+
+
+def drive_outcome(frames, meetings, progress):
+    """The result of a drive with these keyframes."""
+    sights = [frame.sights for frame in frames]
+    return drive_outcome_of(Records.of(frames), frames[-1].impact, sights, meetings, progress)
 
 
 def test_each_encounter_has_its_first_view_and_detection():

@@ -39,9 +39,8 @@ class Observing:
         rig = limits.rig
         self._limits = limits
         self._shares = (budgets[:, None] / rig.grid.size).astype(np.float32)
-        cameras = self._limits.most_by_camera
-        self._detection_bounds = self._limits.detections[0], cameras
-        self._track_bounds = self._limits.tracks[0], self._limits.tracks[1][None]
+        self._detection_bounds = limits.detections[0], limits.pictured[1]
+        self._track_bounds = limits.tracks[0], limits.tracks[1][None]
 
     def write(
         self,
