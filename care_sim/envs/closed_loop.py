@@ -199,7 +199,8 @@ class ClosedLoopEnv(SensingEnv[OneWorld]):
         entropy = self._entropy(seed, options)
         self._running = None
         if self._worlds is None:
-            self._worlds = Worlds([self.setting], self._choice)
+            self._worlds = Worlds([self.setting])
+            self._choice = self._worlds.choice
         info = self._worlds.begin({0: entropy})[0]
         self.keyframes = []
         self._begin(OneWorld(self._worlds.loop))

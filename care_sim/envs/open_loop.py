@@ -24,6 +24,7 @@ from care_sim.evaluation.sightings import ANNOTATED, Sightings, check_presence
 from care_sim.loops.episode import SensorSeeds
 from care_sim.loops.film import Film
 from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe, SceneKeyframe
+from care_sim.loops.stages.choice import Choice
 from care_sim.perception import matching
 from care_sim.perception.detectors import PROXY
 
@@ -107,6 +108,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         self.presence = presence
         self.keyframes: list[OpenLoopKeyframe] = []
         self._masks: list[Mask] = []
+        self._choice = Choice([self.rig], conditions)
 
     @property
     def score(self) -> SceneScore:

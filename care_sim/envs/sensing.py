@@ -117,6 +117,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
     """
 
     acted: NDArray[np.float32]
+    _choice: Choice
     conditions_kind: ClassVar[type[Conditions]] = Conditions
     """The class of its conditions."""
 
@@ -166,7 +167,6 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         )
         self.action_space = spaces.Box(0.0, 1.0, grid.shape, np.float32)
         self.observation_space = observation_space(self.rig)
-        self._choice = Choice([self._rig], conditions)
         self._running: AnyLoop | None = None
         self._over = False
 
@@ -241,8 +241,9 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
 
         Raises InvalidInput for an action of the wrong shape or with values that are not finite.
         """
+        keyframe = self.loop.index
         scores = checked_scores(action, self.rig.grid.shape)
-        return self._choice.would_fire(0, scores, self.loop.index)
+        return self._choice.would_fire(0, scores, keyframe)
 
 
 def entropy_of(env: gymnasium.Env[Any, Any], seed: int | None) -> int:

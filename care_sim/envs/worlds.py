@@ -95,7 +95,7 @@ class Stepped(NamedTuple):
 
 class Worlds:
     """A loop over a world for each of the `settings`, which differ at most in budget and camera.
-    The `choice` is that of their cells. Each world writes the observation of its coming keyframe
+    Each world writes the observation of its coming keyframe
     into its row of `observed`.
 
     Unless `exact`, clearances that no reward needs are bounds (`Loop`); outcomes are exact.
@@ -106,20 +106,14 @@ class Worlds:
     records: Records
     """Records of the last keyframe."""
 
-    def __init__(
-        self,
-        settings: Sequence[Setting],
-        choice: Choice,
-        exact: bool = True,
-        threads: Threads = ALONE,
-    ):
+    def __init__(self, settings: Sequence[Setting], exact: bool = True, threads: Threads = ALONE):
         worlds = len(settings)
         # Settings that all worlds share are read from world 0.
         self._settings = settings
         self._first = first = settings[0]
         self._exact = exact
         rigs, conditions = [each.rig for each in settings], [each.conditions for each in settings]
-        self._choice = choice
+        self.choice = Choice(rigs, first.conditions, threads)
         self._has_one_budget = len({rig.budget for rig in rigs}) == 1
         duration_s = first.scenario.duration_s
         detectors = [each.detector for each in settings]
@@ -143,7 +137,7 @@ class Worlds:
             pool = setting.pool(entropy)
             episode = episodes[world] = setting.episode(entropy)._replace(pool=pool)
             built = self._built[world] = episode.world
-            self._choice.begin(world, episode.floor)
+            self.choice.begin(world, episode.floor)
             self._rewards.begin(world)
             self._sights[world] = []
             drawn = {"drawn": dict(built.drawn)} if built.drawn else {}
@@ -155,7 +149,7 @@ class Worlds:
         """The cells that the worlds `who` (n,) fire by their rows of `actions` (n, E, A), until the
         next call. Raises InvalidInput for scores that are not finite.
         """
-        return self._choice.fired(actions, who, self.loop.state.keyframes)
+        return self.choice.fired(actions, who, self.loop.state.keyframes)
 
     def step(self, fired: Fired, who: Mask) -> Stepped:
         """Let the worlds `who` (n,) play with these cells."""

@@ -27,7 +27,6 @@ from care_sim.envs.sensing import as_scores
 from care_sim.envs.worlds import Stepped, Worlds
 from care_sim.loops.one_world import OneWorld
 from care_sim.loops.records import Keyframe
-from care_sim.loops.stages.choice import Choice
 from care_sim.policies import tags_of
 from care_sim.policies.base import Policy
 from care_sim.policies.vector import vector_policy
@@ -239,8 +238,7 @@ def play_together(configs: Sequence[EpisodeConfig]) -> list[Row]:
         settings = [model.setting] * count
         if model.setting.detector is not None:
             settings = [closed_loop(config.make_env()).setting for config in configs]
-        choice = Choice([setting.rig for setting in settings], model.conditions)
-        with closing(Worlds(settings, choice, exact=False)) as worlds:
+        with closing(Worlds(settings, exact=False)) as worlds:
             observed = worlds.observed
             infos = worlds.begin({world: config.seed for world, config in enumerate(configs)})
             policy.reset()

@@ -30,7 +30,6 @@ from care_sim.envs.vector.arguments import (
     worlds_to_reset,
 )
 from care_sim.envs.worlds import Stepped, Worlds
-from care_sim.loops.stages.choice import Choice
 
 WORLDS_A_THREAD = 32
 """Fewest worlds per thread: with fewer, the overhead of a thread exceeds its gain."""
@@ -104,10 +103,9 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
 
         settings = [model.setting for model in self._models]
         self.thread_pool = Threads(min(num_envs, threads))
-        choice = Choice([one.rig for one in settings], self._model.conditions, self.thread_pool)
         # Infos without clearances need few of them.
         exact = self._model.scoring_info
-        self._worlds = Worlds(settings, choice, exact, self.thread_pool)
+        self._worlds = Worlds(settings, exact, self.thread_pool)
         self._observed = self._worlds.observed
         # Each draws the seeds of its later episodes as the single environment does.
         self._seeded = [gymnasium.Env[Any, Any]() for _ in range(num_envs)]

@@ -181,6 +181,9 @@ class RecordRerun(Watching):
     ```
     """
 
+    _recording: "Recording"
+    _episode: "RecordedEpisode"
+
     def __init__(
         self,
         env: gymnasium.Env[Any, Action],
@@ -193,10 +196,11 @@ class RecordRerun(Watching):
             check_path("path", path)
         if not isinstance(name, str | None):
             raise InvalidInput(f"name must be a text, got {shown(name)}")
-        self._path = Path(fspath(path)) if isinstance(path, str | PathLike) else None
-        self._recording = None if isinstance(path, str | PathLike) else path
+        if isinstance(path, str | PathLike):
+            self._path: Path | None = Path(fspath(path))
+        else:
+            self._path, self._recording = None, path
         self._name = name or (policy.name if policy is not None else "") or "agent"
-        self._episode: RecordedEpisode | None = None
 
     def begin(self, loop: OneWorld | OpenLoop, episode: int) -> None:
         """Open the file of this episode, or its lane in a file that was given."""
@@ -204,23 +208,17 @@ class RecordRerun(Watching):
             self._recording = recording(
                 numbered(self._path, episode), [self._name], isinstance(loop, OpenLoop)
             )
-        assert self._recording is not None
         self._episode = self._recording.episode(self._name, loop)
 
     def look(self, loop: Any) -> None:
         """Take the camera's picture."""
-        if self._episode is not None:
-            self._episode.look(loop)
+        self._episode.look(loop)
 
     def keep(self, watched: Watched) -> None:
         """Log the keyframe."""
-        if self._episode is not None:
-            self._episode.keep(watched)
+        self._episode.keep(watched)
 
     def end(self, outcome: Mapping[str, Any] | None) -> None:
         """Finish the episode, and the file if it is its own."""
-        episode = self._episode
-        self._episode = None
-        if episode is not None and self._recording is not None:
-            with nullcontext() if self._path is None else self._recording:
-                episode.end(outcome)
+        with nullcontext() if self._path is None else self._recording:
+            self._episode.end(outcome)
