@@ -31,15 +31,6 @@ class CameraModel(NamedTuple):
     centre: Floats
 
 
-class CameraModels(NamedTuple):
-    """k cameras: `positions` (k, 3), `axes` (k, 3, 3), `focals` (k,) and `centres` (k, 2)."""
-
-    positions: Floats
-    axes: Floats
-    focals: Floats
-    centres: Floats
-
-
 class MountedCameras(NamedTuple):
     """The k cameras of W cars, as they are mounted. `mounts` (W, k, 4, 3) are place and axes in the
     sensor frame. `focals` (k,), `centres` (k, 2) and `sizes` (k, 2: width, height) are in pixels.
@@ -78,14 +69,14 @@ def _rays(pixels: Floats, camera: CameraModel) -> Floats:
 
 
 @compiled()
-def box_rays(boxes: Floats, numbers: Integers, cameras: CameraModels) -> Floats:
+def box_rays(boxes: Floats, numbers: Integers, cameras: MountedCameras) -> Floats:
     """(n, 9, 3) rays through image boxes (n, 4: left, top, right, bottom) of the cameras `numbers`
-    (n,); see `care_sim.core.pinhole.PinholeCamera.box_rays`.
+    (n,) of the first car; see `care_sim.core.pinhole.PinholeCamera.box_rays`.
     """
     # One ray per entry of `_BOX_POINTS`: each picks one of four places across and one of four down.
     bundles = np.empty((len(boxes), len(_BOX_POINTS), 3))
     for n, (left, top, right, bottom) in enumerate(boxes):
-        camera = model_of(cameras, numbers[n])
+        camera = mounted_model(cameras, 0, numbers[n])
         centre = camera.centre
         # Azimuth and elevation of a box's points are extreme at its corners, or on an edge where it
         # passes nearest to the principal point.
@@ -162,19 +153,8 @@ def window_around(spans: Floats, width: int, height: int) -> tuple[int, int, int
 
 
 @compiled(boundscheck=True)
-def model_of(cameras: CameraModels, number: int) -> CameraModel:
-    """One of several cameras. Raises IndexError for a number that there is not."""
-    return CameraModel(
-        cameras.positions[number],
-        cameras.axes[number],
-        cameras.focals[number],
-        cameras.centres[number],
-    )
-
-
-@compiled()
 def mounted_model(cameras: MountedCameras, world: int, number: int) -> CameraModel:
-    """A camera of a car."""
+    """A camera of a car. Raises IndexError for a number that there is not."""
     mount = cameras.mounts[world, number]
     return CameraModel(mount[0], mount[1:], cameras.focals[number], cameras.centres[number])
 
@@ -357,7 +337,7 @@ class PinholeCamera:
         extreme.
         """
         boxes = np.ascontiguousarray(boxes, dtype=float).reshape(-1, 4)
-        return box_rays(boxes, np.zeros(len(boxes), np.int64), camera_models([self]))
+        return box_rays(boxes, np.zeros(len(boxes), np.int64), mounted_cameras(1, [self]))
 
     def project_boxes(self, boxes: Floats) -> Floats:
         """(n, 4) left, top, right, bottom of 3D boxes (n, 7) in pixels, beyond the picture where
@@ -394,21 +374,13 @@ def checked_cameras(cameras: object, of: str = "") -> tuple[PinholeCamera, ...]:
     return tuple(cameras)
 
 
-def camera_models(cameras: Sequence[PinholeCamera]) -> CameraModels:
-    """The models of k cameras, of which there may be none, as one table."""
-    models = [camera._model for camera in cameras]
-    return CameraModels(
-        np.array([model.position for model in models], float).reshape(-1, 3),
-        np.array([model.axes for model in models], float).reshape(-1, 3, 3),
-        np.array([model.focal for model in models], float),
-        np.array([model.centre for model in models], float).reshape(-1, 2),
-    )
-
-
 def mounted_cameras(worlds: int, cameras: Sequence[PinholeCamera]) -> MountedCameras:
-    """The same cameras on so many cars."""
-    models = camera_models(cameras)
-    mounts = np.concatenate([models.positions[:, None], models.axes], axis=1)
-    sizes = np.array([(one.width, one.height) for one in cameras], np.int64).reshape(-1, 2)
-    many = np.tile(mounts, (worlds, 1, 1, 1))
-    return MountedCameras(many, models.focals, models.centres, sizes)
+    """The same k cameras, of which there may be none, on so many cars."""
+    models = [camera._model for camera in cameras]
+    mounts = np.array([(one.position, *one.axes) for one in models], float).reshape(-1, 4, 3)
+    return MountedCameras(
+        np.tile(mounts, (worlds, 1, 1, 1)),
+        np.array([one.focal for one in models], float),
+        np.array([one.centre for one in models], float).reshape(-1, 2),
+        np.array([(one.width, one.height) for one in cameras], np.int64).reshape(-1, 2),
+    )

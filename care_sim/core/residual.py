@@ -10,7 +10,7 @@ from care_sim.core.belief import Belief
 from care_sim.core.beliefs import Beliefs
 from care_sim.core.cells.sets import CellSets, WorldSets, kept_of_each
 from care_sim.core.frames import turned
-from care_sim.core.pinhole import CameraModels, box_rays, model_of, pixel
+from care_sim.core.pinhole import MountedCameras, box_rays, mounted_model, pixel
 from care_sim.core.rig import Rig
 from care_sim.core.types import ImageDetections, Tracks
 
@@ -128,13 +128,13 @@ def _turned_since(vectors: Floats, detections: ImageDetections) -> Floats:
 
 @compiled()
 def _turned_box_rays(
-    detections: Floats, cosines: Floats, sines: Floats, models: CameraModels
+    detections: Floats, cosines: Floats, sines: Floats, cameras: MountedCameras
 ) -> Floats:
     """`wedge_rays` of `detections` (n, 9), all of whose rays turn by the angle with this cosine and
     sine (n,).
     """
-    cameras = detections[:, _CAMERA].astype(np.int64)
-    rays = box_rays(detections[:, _LEFT : _BOTTOM + 1], cameras, models)
+    numbers = detections[:, _CAMERA].astype(np.int64)
+    rays = box_rays(detections[:, _LEFT : _BOTTOM + 1], numbers, cameras)
     for n in range(len(rays)):
         cos, sin = cosines[n], sines[n]
         for ray in rays[n]:
@@ -145,7 +145,11 @@ def _turned_box_rays(
 
 @compiled()
 def _first_explaining(
-    detections: Floats, tracks: Floats, detected: Integers, tracked: Integers, models: CameraModels
+    detections: Floats,
+    tracks: Floats,
+    detected: Integers,
+    tracked: Integers,
+    cameras: MountedCameras,
 ) -> Integers:
     """Eq. 2: (n,) the row of the first forecast of the class of each detection whose centre lies in
     its image box, -1 without one.
@@ -161,7 +165,7 @@ def _first_explaining(
         end = first + tracked[world]
         while n < last:
             one = detections[n]
-            camera = model_of(models, int(one[_CAMERA]))
+            camera = mounted_model(cameras, 0, int(one[_CAMERA]))
             cos, sin = math.cos(one[_YAW_CHANGE]), math.sin(one[_YAW_CHANGE])
             for m in range(first, end):
                 if tracks[m, _LABEL] == one[_CLASS]:

@@ -27,7 +27,7 @@ from care_sim.core.defaults import (
 from care_sim.core.firing.base import Hardware
 from care_sim.core.firing.listing import hardware_of, settled
 from care_sim.core.grid import AT_LIDAR_M, AngularGrid, Cells
-from care_sim.core.pinhole import CameraModels, PinholeCamera, camera_models, checked_cameras
+from care_sim.core.pinhole import MountedCameras, PinholeCamera, checked_cameras, mounted_cameras
 from care_sim.core.types import Demand, ImageDetections
 
 LIDAR_X_M = -0.445
@@ -114,16 +114,16 @@ class Rig:
         return hardware_of(self.firing, self.grid)
 
     @cached_property
-    def camera_models(self) -> CameraModels:
-        """The cameras as one table."""
-        return camera_models(self.cameras)
+    def camera_models(self) -> MountedCameras:
+        """The cameras as the table of one car."""
+        return mounted_cameras(1, self.cameras)
 
     @cached_property
     def wedge_starts(self) -> Floats | None:
         """(k, 3) the places of the cameras, as `AngularGrid.wedges` takes them; None where all
         count as standing at the one LiDAR.
         """
-        places = self.camera_models.positions
+        places = self.camera_models.mounts[0, :, 0].copy()
         apart = np.linalg.norm(places, axis=1) > AT_LIDAR_M
         return places if len(self.grid.heads) > 1 or apart.any() else None
 

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.core.frames import Frame
-from care_sim.core.pinhole import NEAR_M, PinholeCamera, box_rays, camera_models, window_around
+from care_sim.core.pinhole import NEAR_M, PinholeCamera, box_rays, mounted_cameras, window_around
 from care_sim.sensors.surround import SURROUND_CAMERAS
 
 cameras = st.builds(
@@ -136,11 +136,13 @@ def test_several_cameras_at_once_see_what_each_sees_alone():
         [[10.0, 20, 30, 60], [100, 40, 300, 100], [0, 0, 320, 180], [160, 90, 200, 120]]
     )
     numbers = np.array([5, 0, 2, 0])
-    rays = box_rays(boxes, numbers, camera_models(SURROUND_CAMERAS))
+    rays = box_rays(boxes, numbers, mounted_cameras(1, SURROUND_CAMERAS))
     for row, number in enumerate(numbers):
         np.testing.assert_array_equal(rays[row], SURROUND_CAMERAS[number].box_rays(boxes[row])[0])
 
 
 def test_a_camera_that_the_car_does_not_have_is_no_other():
     with pytest.raises(IndexError):
-        box_rays(np.array([[10.0, 20, 30, 60]]), np.array([6]), camera_models(SURROUND_CAMERAS))
+        box_rays(
+            np.array([[10.0, 20, 30, 60]]), np.array([6]), mounted_cameras(1, SURROUND_CAMERAS)
+        )
