@@ -142,7 +142,6 @@ def test_several_cameras_at_once_see_what_each_sees_alone():
 
 
 def test_a_camera_that_the_car_does_not_have_is_no_other():
+    cameras = mounted_cameras(1, SURROUND_CAMERAS)
     with pytest.raises(IndexError):
-        box_rays(
-            np.array([[10.0, 20, 30, 60]]), np.array([6]), mounted_cameras(1, SURROUND_CAMERAS)
-        )
+        box_rays(np.array([[10.0, 20, 30, 60]]), np.array([6]), cameras)
