@@ -61,7 +61,7 @@ def pool_of_another_drive(
 
         # The picture is taken before each keyframe, as in the episode.
         while not over:
-            seen.append(loop.faultless(loop.mounted))
+            seen.append(loop.faultless(as_mounted=True))
             times_s.append(loop.world.time)
             hit = loop.keyframe(cells).impact_speed_mps is not None
             over = hit or loop.world.time >= duration_s - LAST_BITS_S

@@ -10,7 +10,6 @@ from care_sim.core.belief import Belief
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.frames import Frame
 from care_sim.core.grid import Cells
-from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
 from care_sim.core.types import Scan
 from care_sim.loops.episode import Episode, SensorSeeds
@@ -141,20 +140,16 @@ class OneWorld(TrueLoop):
         """Whether a camera shows enough of a body for a box. Truth: for scoring and people."""
         return self._loop.shows(0, body)
 
-    def faultless(self, cameras: tuple[PinholeCamera, ...] | None = None) -> IdentifiedDetections:
-        """Return the faultless detections of `cameras`, by default those of the rig. Truth: for
-        scoring and people.
+    def faultless(self, as_mounted: bool = False) -> IdentifiedDetections:
+        """Return the faultless detections of the cameras as designed, or as they are mounted.
+        Truth: for scoring and people.
         """
-        world, taken = self.world, cameras or self.rig.cameras
+        world = self.world
+        taken = self._loop.sight.detectors.mounted[0] if as_mounted else self.rig.cameras
         labels, engine = world.labels(), self._loop.conditions.engine
         boxes = self._local_boxes([*labels])
         drawn = make_engine(engine, world.bullet, self.rig.grid), taken, self.sensor, boxes
         return faultless_detections(photographed(*drawn), labels)
-
-    @property
-    def mounted(self) -> tuple[PinholeCamera, ...]:
-        """The cameras at their true mounts."""
-        return self._loop.sight.detectors.mounted[0]
 
     @property
     def _lidar(self) -> Lidar:

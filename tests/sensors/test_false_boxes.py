@@ -203,7 +203,7 @@ def played(env, seed):
     keyframes = []
     while not over:
         film = hasattr(loop, "shot")
-        identified = loop.shot.seen if film else loop.faultless(loop.mounted)
+        identified = loop.shot.seen if film else loop.faultless(as_mounted=True)
         truth = {
             tuple(row) for row in identified.detections.rows().astype(np.float32)[:, SHOWN].tolist()
         }

@@ -25,7 +25,7 @@ class Tracking:
     call.
     """
 
-    def __init__(self, keyframe_s: float, velocity_keyframes: int = 2):
+    def __init__(self, keyframe_s: float, velocity_keyframes: int):
         self._keyframe_s = float(keyframe_s)
         self._life = MemoryRules(velocity_keyframes=velocity_keyframes).life(keyframe_s)
         self._seen = np.empty((0, 0, len(Tracks.COLUMNS)))
