@@ -97,8 +97,8 @@ class Worlds:
     """A loop over a world for each of the `settings`, which differ at most in budget and camera.
     Each world writes the observation of its coming keyframe into its row of `observed`.
 
-    Unless `exact`, clearances that no reward needs are bounds (`Loop`); outcomes are exact. Where all
-    worlds have one budget, infos hold the cells as one array, else as one array per world.
+    Unless `exact`, clearances that no reward needs are bounds (`Loop`); outcomes are exact. Where
+    all worlds have one budget, infos hold the cells as one array, else as one array per world.
     """
 
     records: Records
