@@ -58,8 +58,7 @@ def shows_belief(env: gymnasium.Env[Any, Any] | AnyVector) -> bool:
 
 class Reading:
     """The beliefs of the observation that a wrapper of `env`, an environment or a vector, was last
-    given: read with its rig, or, where a wrapper `inside` was given the very same, those that are
-    read already.
+    given. Where a wrapper `inside` was given the very same, they are those that it has read.
     """
 
     def __init__(
