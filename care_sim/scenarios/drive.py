@@ -4,7 +4,7 @@ All that is drawn, and from which ranges, is in `care_sim.streets.drive` and
 `care_sim.streets.encounters`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Self
@@ -19,11 +19,11 @@ from care_sim.scenarios.base import LONGEST_EPISODE_S, Scenario
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.streets.draft import footprints_meet
 from care_sim.streets.drive import SAMPLE_S, TURN_CHANCE, Drive, draw_drive
-from care_sim.streets.drivers import DrivenLane
+from care_sim.streets.drivers import DrivenLane, LanePoses
 from care_sim.streets.encounters import AT_KERB, COMERS, Course, Encounter, Wanted
 from care_sim.streets.layouts import LANE_WIDTH_M, SPEED_LIMIT_MPS
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.lane_flow import Crossing, FlowingLane, LaneFlow, StreetTraffic
+from care_sim.world.lane_flow import Crossing, FlowingLane, StreetTraffic
 from care_sim.world.motions import Crosser, Meeting, Walk
 from care_sim.world.route import SpeedPlan
 from care_sim.world.traffic import Traffic
@@ -83,7 +83,8 @@ class DriveScenario(Scenario):
         world = World(nobody, drive.plan.cruise_mps, drive.plan.route)
         world.goal_m = drive.goal_m
         world.speed_plan = drive.plan
-        traffic = StreetTraffic([_flowing(drive, lane) for lane in drive.lanes])
+        lanes = [_flowing(drive, lane) for lane in drive.lanes]
+        traffic = StreetTraffic(lanes, LanePoses(drive.lanes))
         _add_bodies(world, drive)
         _add_vehicles(world, drive, traffic)
         _add_encounters(world, drive, traffic)
@@ -92,15 +93,15 @@ class DriveScenario(Scenario):
 
 def _flowing(drive: Drive, lane: DrivenLane) -> FlowingLane:
     """Return a lane with its drivers, and the ego's part in it."""
-    flow = LaneFlow(lane.places, lane.speeds)
     # The ego's own lanes are those along its roads whose middle is its route. While it turns, it is
     # in both: its tail is in the way of who follows until the turn ends.
     before = [-np.inf, *(one.to_m for one in drive.stretches[:-1])]
     after = [*(one.from_m for one in drive.stretches[1:]), np.inf]
     for stretch, begins, ends in zip(drive.stretches, before, after, strict=True):
         if stretch.road.curve == lane.curve and lane.d == 0.0:
-            return FlowingLane(flow, lane.poses_at, lane.stop_m, begins, ends, -stretch.offset_m)
-    return FlowingLane(flow, lane.poses_at, lane.stop_m)
+            part = begins, ends, -stretch.offset_m
+            return FlowingLane(lane.places, lane.speeds, lane.stop_m, *part)
+    return FlowingLane(lane.places, lane.speeds, lane.stop_m)
 
 
 def _add_bodies(world: World, drive: Drive) -> None:
@@ -123,8 +124,9 @@ class _Ways:
         # Between two samples evenly, heading as at the first.
         steps = min(round(time / WORLD_STEP_S), _BETWEEN * (len(self._samples) - 1) - 1)
         sample, step = divmod(steps, _BETWEEN)
-        poses: Floats = self._samples[sample].copy()
-        poses[:, :2] += step / _BETWEEN * (self._samples[sample + 1, :, :2] - poses[:, :2])
+        before = self._samples[sample]
+        poses: Floats = before + step / _BETWEEN * (self._samples[sample + 1] - before)
+        poses[:, 2] = before[:, 2]
         return poses
 
     def __deepcopy__(self, _copied: dict[int, object]) -> Self:
@@ -205,39 +207,21 @@ def _may_go(
     drive: Drive, traffic: StreetTraffic, size: tuple[float, float]
 ) -> Callable[[Walk], bool]:
     """Return the rule by which a crosser of a `size` sets off."""
-    lanes = [
-        (flowing, np.array([CATALOGUE[kind].size[:2] for kind in lane.kinds]))
-        for flowing, lane in zip(traffic.lanes, drive.lanes, strict=True)
-        if lane.kinds
-    ]
-
-    return partial(_is_free, lanes, size)
+    sizes = [CATALOGUE[kind].size[:2] for lane in drive.lanes for kind in lane.kinds]
+    return partial(_is_free, traffic, np.array(sizes, float).reshape(-1, 2), size)
 
 
-def _is_free(
-    lanes: Sequence[tuple[FlowingLane, Floats]], size: tuple[float, float], walk: Walk
-) -> bool:
-    """Return True if a crosser of a `size` keeps clear of all traffic, without braking drivers."""
+def _is_free(traffic: StreetTraffic, sizes: Floats, size: tuple[float, float], walk: Walk) -> bool:
+    """Return True if a crosser of a `size` keeps clear of all traffic, without braking drivers. The
+    vehicles have `sizes` (n, 2).
+    """
     times = np.arange(0.0, walk.duration_to(walk.length_m), LOOK_AHEAD_STEP_S)
     own = np.array([walk.pose(walk.starts_s + time) for time in times.tolist()])
-    return not any(_meet(lane, sizes, times, own, size) for lane, sizes in lanes)
-
-
-def _meet(
-    lane: FlowingLane, sizes: Floats, times: Floats, own: Floats, size: tuple[float, float]
-) -> bool:
-    """Return True if vehicles of `sizes` (n, 2) come close to `own` poses (t, 3) at `times`
-    (t,).
-    """
-    places = lane.foreseen(len(times), LOOK_AHEAD_STEP_S)
-    poses = lane.poses_at(places.ravel())
-    count = len(sizes)
-    return bool(
-        footprints_meet(
-            np.repeat(own, count, axis=0),
-            np.broadcast_to(size, (len(poses), 2)),
-            poses,
-            np.tile(sizes, (len(times), 1)),
-            np.full(len(poses), CLEAR_M),
-        ).any()
-    )
+    poses = traffic.foreseen(len(times), LOOK_AHEAD_STEP_S).reshape(-1, 3)
+    return not footprints_meet(
+        np.repeat(own, len(sizes), axis=0),
+        np.broadcast_to(size, (len(poses), 2)),
+        poses,
+        np.tile(sizes, (len(times), 1)),
+        np.full(len(poses), CLEAR_M),
+    ).any()

@@ -5,6 +5,7 @@ Traffic drives on a straight line, which is then bent along the road. In a bend 
 reference line is a few per cent longer or shorter than the straight one.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,6 +23,7 @@ from care_sim.streets.layouts import (
     Range,
     Road,
     draw,
+    place_on,
 )
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.lane_flow import STANDING_GAP_M
@@ -234,13 +236,24 @@ class DrivenLane:
     speeds: tuple[float, ...]
     stop_m: float = np.inf
 
-    def poses_at(self, places: Floats) -> Floats:
-        """(n, 3) world poses of places (n,)."""
-        road = np.empty((len(places), 3))
-        road[:, 0] = self.direction * places
-        road[:, 1] = self.d
-        road[:, 2] = 0.0 if self.direction > 0 else np.pi
-        return self.curve.to_world(road)
+
+class LanePoses:
+    """World poses of the vehicles of lanes, lane by lane."""
+
+    def __init__(self, lanes: Sequence[DrivenLane]):
+        counts = [len(lane.kinds) for lane in lanes]
+        rows = [
+            (*one.curve.line[0], one.direction, one.d, np.pi * (one.direction < 0)) for one in lanes
+        ]
+        columns = np.repeat(np.array(rows, float).reshape(-1, 11), counts, axis=0)
+        self._lines, self._on_road = columns[:, :8].copy(), columns[:, 8:].copy()
+
+    def __call__(self, places: Floats) -> Floats:
+        """(..., n, 3) world poses of the n vehicles at `places` (..., n)."""
+        rows = np.empty((*places.shape, 3))
+        rows[...] = self._on_road
+        rows[..., 0] *= places
+        return place_on(self._lines, rows.reshape(-1, 3)).reshape(rows.shape)
 
 
 def drive_own_lane(rng: np.random.Generator, plan: Plan, reach_m: float) -> DrivenLane:

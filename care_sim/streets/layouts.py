@@ -59,17 +59,26 @@ class Curve:
     def to_world(self, places: Floats) -> Floats:
         """World poses (..., 3: x, y, heading) of places (..., 3: s, d, heading) on the road."""
         rows = np.ascontiguousarray(places, dtype=float)
-        turns = _AHEAD
-        if self.curvature:
-            along = np.minimum(np.maximum(rows[..., 0] - self.bend_at, 0.0), self.bend_length)
-            turns = _turns(self.curvature * along.ravel())
-        return np.asarray(_placed(rows.reshape(-1, 3), turns, *self._line).reshape(rows.shape))
+        return place_on(self.line, rows.reshape(-1, 3)).reshape(rows.shape)
 
     @cached_property
-    def _line(self) -> tuple[tuple[float, float], tuple[float, float, float, float, float]]:
-        x, y, heading = map(float, self.start)
-        turn = float(np.cos(heading)), float(np.sin(heading))
-        return (float(self.bend_at), float(self.bend_length)), (x, y, heading, *turn)
+    def line(self) -> Floats:
+        """(1, 8) `bend_at`, `bend_length`, `curvature`, x, y and heading of the `start`, and the
+        heading's cosine and sine.
+        """
+        turn = np.cos(self.start[2]), np.sin(self.start[2])
+        return np.array([(self.bend_at, self.bend_length, self.curvature, *self.start, *turn)])
+
+
+def place_on(lines: Floats, rows: Floats) -> Floats:
+    """World poses (n, 3) of places (n, 3) on roads, as `Curve.to_world`. The places are on the
+    roads' `lines` (m, 8) in turn, again and again.
+    """
+    turns = _AHEAD
+    if lines[:, 2].any():
+        along = rows[:, 0].reshape(-1, len(lines)) - lines[:, 0]
+        turns = _turns((lines[:, 2] * np.minimum(np.maximum(along, 0.0), lines[:, 1])).ravel())
+    return np.asarray(_placed(rows, turns, lines))
 
 
 def _turns(turns: Floats) -> Floats:
@@ -88,28 +97,24 @@ _AHEAD = _turns(np.zeros(1))
 
 
 @compiled()
-def _placed(
-    rows: Floats,
-    turns: Floats,
-    bend: tuple[float, float],
-    start: tuple[float, float, float, float, float],
-) -> Floats:
-    """Return `Curve.to_world` of rows (n, 3). The columns of `turns` are those of `_turns` at each
-    row, or one for all. `start` is x, y, heading, and the heading's cosine and sine.
+def _placed(rows: Floats, turns: Floats, lines: Floats) -> Floats:
+    """Return `place_on`. The columns of `turns` are those of `_turns` at each row, or one for
+    all.
     """
     world = np.empty(rows.shape)
     for n in range(len(rows)):
         s, d, heading = rows[n]
+        at, length, _, start_x, start_y, ahead, cos_ahead, sin_ahead = lines[n % len(lines)]
         turn, share, cos_half, sin_half, cos, sin = turns[:, min(n, turns.shape[1] - 1)]
         # Three parts, one after the other: the straight before lies along x, the chord at half the
         # turn, the straight after at the whole turn. d goes to the left of where the line points.
-        chord = min(max(s - bend[0], 0.0), bend[1]) * share
-        after = max(s - bend[0] - bend[1], 0.0)
-        x = min(s, bend[0]) + chord * cos_half + after * cos - d * sin
+        chord = min(max(s - at, 0.0), length) * share
+        after = max(s - at - length, 0.0)
+        x = min(s, at) + chord * cos_half + after * cos - d * sin
         y = chord * sin_half + after * sin + d * cos
-        world[n, 0] = start[3] * x - start[4] * y + start[0]
-        world[n, 1] = start[4] * x + start[3] * y + start[1]
-        world[n, 2] = start[2] + turn + heading
+        world[n, 0] = cos_ahead * x - sin_ahead * y + start_x
+        world[n, 1] = sin_ahead * x + cos_ahead * y + start_y
+        world[n, 2] = ahead + turn + heading
     return world
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.core.arrays import Floats
+from care_sim.core.arrays import Floats, Integers
 from care_sim.world.motions import Crosser
 
 MOST_MPS2 = 6.0
@@ -28,36 +28,45 @@ TIME_GAP_S = 1.5
 EXPONENT = 4.0
 
 
+Other = tuple[float, float, int]
+"""Place and speed of something else in a lane, such as the ego, and the number of the lane."""
+
+
 class LaneFlow:
-    """Vehicles that keep one lane. Places are those of their middles, metres the way they drive."""
+    """Vehicles that keep their lanes. Places are those of their middles, metres the way they
+    drive.
+    """
 
     places: Floats
     """(n,) metres."""
     speeds: Floats
     """(n,) m/s."""
+    lanes: Integers
+    """(n,) numbers of lanes."""
 
-    def __init__(self, places: Sequence[float], wanted: Sequence[float]):
+    def __init__(self, places: Sequence[float], wanted: Sequence[float], lanes: Sequence[int]):
         """Vehicles at `places` that drive at the speeds `wanted` (m/s, above 0), and want to."""
         self.places = np.array(places, float)
         self.speeds = np.array(wanted, float)
+        self.lanes = np.array(lanes, np.int64)
         self._wanted = self.speeds.copy()
 
-    def step(self, dt: float, others: Sequence[tuple[float, float]] = ()) -> None:
-        """Let every driver decide, then move all by `dt` seconds. `others` are place and speed of
-        other things in the lane, such as the ego.
+    def step(self, dt: float, others: Sequence[Other] = ()) -> None:
+        """Let every driver decide, then move all by `dt` seconds. There are `others` in the
+        lanes.
         """
         # The power is NumPy's, as compiled code may round it differently.
         free = 1 - (self.speeds / self._wanted) ** EXPONENT
-        ahead = np.array(others, float).reshape(-1, 2)
-        self.places, self.speeds = _moved(free, self.places, self.speeds, ahead, dt)
+        ahead = np.array(others, float).reshape(-1, 3)
+        self.places, self.speeds = _moved(free, self.places, self.speeds, self.lanes, ahead, dt)
 
 
 @compiled(error_model="numpy")
 def _moved(
-    free: Floats, places: Floats, speeds: Floats, others: Floats, dt: float
+    free: Floats, places: Floats, speeds: Floats, lanes: Integers, others: Floats, dt: float
 ) -> tuple[Floats, Floats]:
     """(n,) places and speeds after `dt` seconds of drivers at `places` with `speeds`, who follow
-    each other and `others` (m, 2), places and speeds. `free` are the shares of their acceleration
+    each other and `others` (m, 3) in their `lanes`. `free` are the shares of their acceleration
     that each would take on a free road.
     """
     moved = np.empty(len(places))
@@ -66,11 +75,11 @@ def _moved(
         gap, lead_mps = math.inf, 0.0
         for other in range(len(places)):
             apart = places[other] - places[n]
-            if 0.0 < apart < gap:
+            if lanes[other] == lanes[n] and 0.0 < apart < gap:
                 gap, lead_mps = apart, speeds[other]
         for other in range(len(others)):
             apart = others[other, 0] - places[n]
-            if 0.0 < apart < gap:
+            if others[other, 2] == lanes[n] and 0.0 < apart < gap:
                 gap, lead_mps = apart, others[other, 1]
         closing = speeds[n] * (speeds[n] - lead_mps)
         wished = (
@@ -103,14 +112,14 @@ class Crossing:
 
 @dataclass(frozen=True)
 class FlowingLane:
-    """A lane and its vehicles. `poses_at` returns the world poses (n, 3) of places (n,) along the
-    lane. `stop_m` is where its drivers give way, inf if they need not. The ego is in the lane while
-    it is between `ego_from_m` and `ego_to_m` along its route. Its place in the lane is then
-    `ego_ahead_m` farther. Drivers stop for anybody in one of the `crossings`.
+    """A lane with vehicles at first `places` that want to drive at `speeds`. `stop_m` is where they
+    give way, inf if they need not. The ego is in the lane while it is between `ego_from_m` and
+    `ego_to_m` along its route. Its place in the lane is then `ego_ahead_m` farther. Drivers stop
+    for anybody in one of the `crossings`.
     """
 
-    flow: LaneFlow
-    poses_at: Callable[[Floats], Floats]
+    places: Sequence[float]
+    speeds: Sequence[float]
     stop_m: float = np.inf
     ego_from_m: float = np.inf
     ego_to_m: float = np.inf
@@ -121,37 +130,34 @@ class FlowingLane:
         """Return place and speed of everything but drivers in the lane at `time`, for an ego
         `ego_m` along its route.
         """
-        found = self._stop_line()
+        found = self.stop_line()
         if self.ego_from_m <= ego_m < self.ego_to_m:
             found.append((ego_m + self.ego_ahead_m, ego_speed))
         # A crosser goes straight across: the speed along the lane is 0.
         found += [(one.place_m, 0.0) for one in self.crossings if one.is_taken(time)]
         return found
 
-    def foreseen(self, steps: int, dt: float) -> Floats:
-        """Return (steps, n) future places of the drivers, every `dt` seconds, if neither the ego
-        nor a crosser makes them brake.
-        """
-        flow = deepcopy(self.flow)
-        places = np.empty((steps, len(flow.places)))
-        for row in places:
-            row[:] = flow.places
-            flow.step(dt, self._stop_line())
-        return places
-
-    def _stop_line(self) -> list[tuple[float, float]]:
+    def stop_line(self) -> list[tuple[float, float]]:
         """Return place and speed of the obstacle at the stop line, if drivers give way."""
         return [(self.stop_m, 0.0)] if math.isfinite(self.stop_m) else []
 
 
 class StreetTraffic:
     """All lanes of a street. Drivers follow the vehicle ahead in their lane, the ego included, and
-    stop for crossers.
+    stop for crossers. `poses_of` returns world poses (..., n, 3) of all vehicles, lane by lane, at
+    places (..., n).
     """
 
-    def __init__(self, lanes: Sequence[FlowingLane]):
+    def __init__(self, lanes: Sequence[FlowingLane], poses_of: Callable[[Floats], Floats]):
         self.lanes = tuple(lanes)
-        self._poses = self._poses_now()
+        vehicles = [
+            (*vehicle, number)
+            for number, lane in enumerate(lanes)
+            for vehicle in zip(lane.places, lane.speeds, strict=True)
+        ]
+        self.flow = LaneFlow(*np.array(vehicles, float).reshape(-1, 3).T)
+        self._poses_of = poses_of
+        self._poses = poses_of(self.flow.places)
 
     def poses_at(self, _time: float) -> Floats:
         """Return (n, 3) the world poses now of all vehicles, lane by lane."""
@@ -159,10 +165,21 @@ class StreetTraffic:
 
     def step(self, dt: float, time: float, ego_m: float, ego_speed: float) -> None:
         """Move all by `dt` seconds, to `time`, with the ego `ego_m` along its route."""
-        for lane in self.lanes:
-            lane.flow.step(dt, lane.others(time, ego_m, ego_speed))
-        self._poses = self._poses_now()
+        self.flow.step(dt, _numbered([one.others(time, ego_m, ego_speed) for one in self.lanes]))
+        self._poses = self._poses_of(self.flow.places)
 
-    def _poses_now(self) -> Floats:
-        poses = [lane.poses_at(lane.flow.places) for lane in self.lanes]
-        return np.concatenate([np.empty((0, 3)), *poses])
+    def foreseen(self, steps: int, dt: float) -> Floats:
+        """Return (steps, n, 3) future poses of all vehicles, every `dt` seconds, if neither the ego
+        nor a crosser makes them brake.
+        """
+        flow, others = deepcopy(self.flow), _numbered([one.stop_line() for one in self.lanes])
+        places = np.empty((steps, len(flow.places)))
+        for row in places:
+            row[:] = flow.places
+            flow.step(dt, others)
+        return self._poses_of(places)
+
+
+def _numbered(others: Sequence[Sequence[tuple[float, float]]]) -> list[Other]:
+    """Return what is in each lane, with the number of the lane."""
+    return [(*one, number) for number, row in enumerate(others) for one in row]

@@ -36,11 +36,11 @@ class Driver(IDMVehicle):
 class HighwayLane:
     """A lane of a drive, driven by highway-env."""
 
-    def __init__(self, flow):
+    def __init__(self, lane):
         network = RoadNetwork()
         network.add_lane("a", "b", EndlessLane([0.0, 0.0], [1.0, 0.0], speed_limit=30.0))
         self.road = Road(network, np_random=np.random.RandomState(0))
-        for place, speed in zip(flow.places.tolist(), flow.speeds.tolist(), strict=True):
+        for place, speed in zip(lane.places, lane.speeds, strict=True):
             driver = Driver(self.road, [place, 0.0], 0.0, speed)
             # Bodies meet in PyBullet alone.
             driver.check_collisions = driver.collidable = driver.enable_lane_change = False
@@ -63,20 +63,21 @@ class Beside(StreetTraffic):
 
     made = []  # noqa: RUF012 (emptied by the test)
 
-    def __init__(self, lanes):
-        super().__init__(lanes)
-        self.theirs = [HighwayLane(lane.flow) for lane in self.lanes]
+    def __init__(self, lanes, poses_of):
+        super().__init__(lanes, poses_of)
+        self.theirs = [HighwayLane(lane) for lane in self.lanes]
         self.steps = self.braked = self.stopped_for = 0
         self.made.append(self)
 
     def step(self, dt, time, ego_m, ego_speed):
         told = [lane.others(time, ego_m, ego_speed) for lane in self.lanes]
-        before = [lane.flow.speeds.copy() for lane in self.lanes]
+        before = self.flow.speeds.copy()
         super().step(dt, time, ego_m, ego_speed)
-        for lane, theirs, others, speeds in zip(self.lanes, self.theirs, told, before, strict=True):
+        self.braked += (self.flow.speeds - before < -1.0 * dt).sum()
+        for n, (lane, theirs, others) in enumerate(zip(self.lanes, self.theirs, told, strict=True)):
             theirs.step(dt, others)
-            assert np.array_equal([lane.flow.places, lane.flow.speeds], theirs.state)
-            self.braked += (lane.flow.speeds - speeds < -1.0 * dt).sum()
+            mine = self.flow.lanes == n
+            assert np.array_equal([self.flow.places[mine], self.flow.speeds[mine]], theirs.state)
             self.stopped_for += any(one.is_taken(time) for one in lane.crossings)
         self.steps += 1
 
