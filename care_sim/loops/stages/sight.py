@@ -78,13 +78,14 @@ class Seeing:
         if not self.is_fast:
             self._drawers[world] = make_engine(self._engine, built.bullet, self._rig.grid), labels
         target = built.first_sighting
-        asked = [one.body for one in built.meetings] + ([target.body] if target else [])
+        # The target is often one of those that the ego meets.
+        asked = list({one.body for one in (*built.meetings, target) if one is not None})
         if len(asked) > self._asked.shape[1]:
             self._asked = longer(self._asked, len(asked), empty=NO_BODY)
         self._asked[world] = NO_BODY
         self._asked[world, : len(asked)] = asked
         # The pictures hold what is reported, and others by chance.
-        self._asks_few[world] = self.after_steps[world] > 0 and labels.keys() >= {*asked}
+        self._asks_few[world] = self.after_steps[world] > 0 and labels.keys() >= set(asked)
 
     def look(self, state: State) -> tuple[Detected, Mask]:
         """Take the pictures of a keyframe. Return the newest detections that are due, and (W, B)
