@@ -165,7 +165,7 @@ official-precision: $(OFFICIAL)/.installed
 	$(OFFICIAL)/bin/python tests/official/average_precision.py "$(FOLDER)/official"
 
 test-official: $(VENV)/.developing $(OFFICIAL)/.installed
-	$(BIN)/python -m pytest tests/official
+	$(BIN)/python -m pytest tests/official -m "not slow and not speed"
 
 clean:
 	rm -rf $(VENV) $(OFFICIAL) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,8 +1,8 @@
 """Films of the published streets, kept in the user's cache folder for later runs.
 
 Making such a film takes thirty times as long as reading it. A file has 2 MB, those of the
-benchmark's streets together a sixth of a gigabyte. Code, libraries and processor are part of the key: the
-film of another maker is replaced.
+benchmark's streets together a sixth of a gigabyte. Code, libraries and processor are part of the
+key: the film of another maker is replaced.
 """
 
 import hashlib
