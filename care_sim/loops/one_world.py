@@ -140,7 +140,7 @@ class OneWorld(TrueLoop):
         """Whether a camera shows enough of a body for a box. Truth: for scoring and people."""
         return self._loop.shows(0, body)
 
-    def faultless(self, as_mounted: bool = False) -> IdentifiedDetections:
+    def faultless(self, *, as_mounted: bool = False) -> IdentifiedDetections:
         """Return the faultless detections of the cameras as designed, or as they are mounted.
         Truth: for scoring and people.
         """

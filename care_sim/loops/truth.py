@@ -72,7 +72,8 @@ class TrueLoop(ABC):
         present = self._present([number for number in behind if number != NO_OBJECT])
         boxes = tracks.boxes.copy()
         for row, number in enumerate(behind):
-            boxes[row] = present.get(number, boxes[row])
+            if number != NO_OBJECT:
+                boxes[row] = present.get(number, boxes[row])
         return boxes
 
     @abstractmethod

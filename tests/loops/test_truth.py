@@ -5,7 +5,7 @@ import numpy as np
 from care_sim.loops.truth import TrueLoop
 from care_sim.sensors.annotated import NO_OBJECT
 
-PRESENT = {30: np.full(7, 100.0), 7: np.full(7, 200.0)}
+PRESENT = {30: np.full(7, 100.0), 7: np.full(7, 200.0), NO_OBJECT: np.full(7, 300.0)}
 
 
 class Noted(TrueLoop):
@@ -20,7 +20,7 @@ class Noted(TrueLoop):
         raise NotImplementedError
 
     def _present(self, objects):
-        return {number: PRESENT[number] for number in objects if number in PRESENT}
+        return PRESENT
 
 
 def places(loop, tracks):

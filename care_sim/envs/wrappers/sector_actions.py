@@ -61,8 +61,7 @@ class _Reserve(_Sectors, ReadsBeliefs):
         self.reading.take(answer[0])
         return answer
 
-    def step(self, action: NDArray[np.float32]) -> Any:
-        """Fire the scores that `action` makes and advance to the next keyframe."""
+    def _stepped(self, action: NDArray[np.float32]) -> Any:
         answer = self.env.step(self.action(action))
         self.reading.take(answer[0])
         return answer
@@ -138,6 +137,10 @@ class SectorReserve(_Reserve, _SingleSectors):
         super().__init__(env, azimuths, elevations)
         self._read(env)
 
+    def step(self, action: NDArray[np.float32]) -> Any:
+        """Fire the scores that `action` makes and advance to the next keyframe."""
+        return self._stepped(action)
+
 
 class SectorScores(_SingleSectors):
     """The action scores everything: sectors are fired whole, best first, up to the budget.
@@ -182,10 +185,13 @@ class _VectorSectors(_Sectors, WorldsWrapper):
         """Scores (W, E, A) of the cells that the shared allocator takes, until the next call."""
         return self._cells(checked_scores(action, (self.num_envs, *self.sectors.shape)))
 
-    def step(self, action: NDArray[np.float32]) -> Any:
-        """Fire the cells of the scores `action` (W, elevations, azimuths) and advance to the next
+    def step(self, actions: NDArray[np.float32]) -> Any:
+        """Fire the cells of the scores `actions` (W, elevations, azimuths) and advance to the next
         keyframe.
         """
+        return self._stepped(actions)
+
+    def _stepped(self, action: NDArray[np.float32]) -> Any:
         return self.env.step(self.action(action))
 
 

@@ -11,7 +11,7 @@ from care_sim.scenarios.dartout import Dense
 from tests.envs.vector.test_same_episodes import CONDITIONS, OWN
 from tests.helpers.vectors import MODES, played_alike
 
-BATCHES = int(os.environ.get("CARE_SIM_DRAWN", "2000")) // 100
+BATCHES = max(1, int(os.environ.get("CARE_SIM_DRAWN", "2000")) // 100)
 FALSE_BOXES = ("camera_profile", "false_positive_rate")
 OF_THE_SCENARIO = {field.name for field in fields(Dense)}
 

@@ -70,7 +70,7 @@ def played(envs, steps=40):
     """All that vector environments answer."""
     told = [copy.deepcopy(envs.reset(seed=list(SEEDS)))]
     for actions in given(envs.action_space, steps):
-        answer = envs.step(actions)
+        answer = envs.step(actions=actions)
         told.append(copy.deepcopy(answer))
         over = answer[2] | answer[3]
         if envs.metadata["autoreset_mode"] == AutoresetMode.DISABLED and over.any():
