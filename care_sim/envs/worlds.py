@@ -174,7 +174,8 @@ class Worlds:
                 shape, kind = (values.shape, values.dtype) if self._has_one_budget else ((), object)
                 if name not in columns:
                     columns[name] = np.zeros((len(self._settings), *shape), kind)
-                columns[name][world] = values.copy()
+                # An array of objects would keep the reused table itself.
+                columns[name][world] = values if self._has_one_budget else values.copy()
         return columns
 
     def _played(self, fired: Fired, who: Mask) -> Stepped:

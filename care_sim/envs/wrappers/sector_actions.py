@@ -43,6 +43,9 @@ class _Sectors:
         """Scores of the cells that the shared allocator takes."""
         raise NotImplementedError
 
+    def _stepped(self, action: NDArray[np.float32]) -> Any:
+        return self.env.step(self.action(action))
+
     def _cells(self, scores: NDArray[np.float32]) -> Action:
         """Scores (W, E, A) of the cells that the shared allocator takes, until the next call."""
         return self._fired.alone(scores)
@@ -62,7 +65,7 @@ class _Reserve(_Sectors, ReadsBeliefs):
         return answer
 
     def _stepped(self, action: NDArray[np.float32]) -> Any:
-        answer = self.env.step(self.action(action))
+        answer = super()._stepped(action)
         self.reading.take(answer[0])
         return answer
 
@@ -190,9 +193,6 @@ class _VectorSectors(_Sectors, WorldsWrapper):
         keyframe.
         """
         return self._stepped(actions)
-
-    def _stepped(self, action: NDArray[np.float32]) -> Any:
-        return self.env.step(self.action(action))
 
 
 class VectorSectorReserve(_Reserve, _VectorSectors):

@@ -61,7 +61,7 @@ CONDITIONS = {
         "ego_pose_correlation_s": 1.0,
     },
     "a human": {"driver": "careful-human"},
-    "bullet": {"engine": "bullet", "duration_s": 0.6},
+    "bullet": {"engine": "bullet", "duration_s": 0.6, "false_positive_rate": 1.0},
     "a camera that invents": {"false_positive_rate": 1.0, "camera_latency_s": 0.13},
     "crooked": {"camera_rotation_sigma_deg": 1.0, "camera_position_sigma_m": 0.1},
     "a measured camera": {"camera_profile": "kitti"} | LATE,
