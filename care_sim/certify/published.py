@@ -1,7 +1,7 @@
 """The published trails, a file of the package."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from care_sim.base.errors import InvalidInput
@@ -13,22 +13,32 @@ FILE = Path(__file__).with_name("published.parquet")
 
 def read(path: Path = FILE) -> list[bytes]:
     """The trails by number. Raises InvalidInput for a file that is missing or damaged."""
+    trails = _column("trail", path)
+    found = [trail for trail in trails if trail is not None]
+    if len(found) < len(trails):
+        raise InvalidInput(f"{path} holds no trails: install the package again")
+    return found
+
+
+def read_narrow(path: Path = FILE) -> dict[int, bytes]:
+    """The trails of episodes that go otherwise on a processor without AVX-512, by number: NumPy
+    rounds the last bit of some sines and arctangents otherwise there.
+    """
+    trails = _column("narrow", path)
+    return {number: trail for number, trail in enumerate(trails) if trail is not None}
+
+
+def _column(name: str, path: Path) -> list[bytes | None]:
     if not path.exists():
         raise InvalidInput("the list of certify is missing: install the package again")
-    rows = read_rows(path)
-    trails = [
-        trail
-        for row in rows
-        if isinstance(trail := row.get("trail"), bytes) and len(trail) > DIGEST_BYTES
-    ]
-    if len(trails) < len(rows):
-        raise InvalidInput(f"{path} holds no trails: install the package again")
-    return trails
+    column = [row.get(name) for row in read_rows(path)]
+    return [one if isinstance(one, bytes) and len(one) > DIGEST_BYTES else None for one in column]
 
 
-def write(trails: Sequence[bytes], path: Path = FILE) -> None:
-    """Publish the trails of the episodes from 0 on."""
-    write_columns({"trail": list(trails)}, path)
+def write(trails: Sequence[bytes], narrow: Mapping[int, bytes], path: Path = FILE) -> None:
+    """Publish the trails of the episodes from 0 on, and those of `read_narrow`."""
+    others = [narrow.get(number) for number in range(len(trails))]
+    write_columns({"trail": [*trails], "narrow": others}, path)
 
 
 def combined(trails: Sequence[bytes]) -> str:

@@ -29,6 +29,6 @@ def certify(options: Certify) -> int:
         found = playing.trails_of(
             [episode.number for episode in episodes], options.workers, lambda done: show(done, "")
         )
-    verdict = verdict_of(found, known, len(numbers))
+    verdict = verdict_of(found, known, published.read_narrow(), len(numbers))
     print(*verdict.lines(), sep="\n")
     return DONE if verdict.as_published else FAILED

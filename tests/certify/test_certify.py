@@ -288,27 +288,38 @@ def test_another_configuration_is_named():
 def test_the_first_that_differs_is_told_with_what_it_is_made_of_and_a_command():
     trails = [bytes([n]) * (DIGEST_BYTES + 20) for n in range(6)]
     other = trails[4][:-3] + b"abc"
-    verdict = verdict_of(dict(enumerate(trails)) | {4: other, 5: trails[0]}, trails)
+    verdict = verdict_of(dict(enumerate(trails)) | {4: other, 5: trails[0]}, trails, {})
     lines = [*verdict.lines()]
     assert not verdict.as_published
     assert lines[1].startswith("the first is episode 4, which differs first in")
     assert lines[2:] == [f"  {drawn(4).text}", "  care-sim certify --episode 4"]
-    whole = verdict_of(dict(enumerate(trails)), trails)
+    whole = verdict_of(dict(enumerate(trails)), trails, {})
     assert whole.as_published
     assert [*whole.lines()] == [f"6 episodes: {published.combined(trails)}, as published"]
 
 
 def test_the_combined_hash_is_over_the_order_of_the_numbers():
     one, two = b"a" * 20, b"b" * 20
-    assert verdict_of({1: two, 0: one}, [one, two]).hash == published.combined([one, two])
+    assert verdict_of({1: two, 0: one}, [one, two], {}).hash == published.combined([one, two])
     assert published.combined([one, two]) != published.combined([two, one])
+
+
+def test_episodes_of_a_processor_without_avx512_count_as_published(tmp_path):
+    trails = [bytes([n]) * (DIGEST_BYTES + 20) for n in range(3)]
+    published.write(trails, {1: bytes(DIGEST_BYTES + 20)}, tmp_path / "list.parquet")
+    narrow = published.read_narrow(tmp_path / "list.parquet")
+    assert narrow == {1: bytes(DIGEST_BYTES + 20)}
+    verdict = verdict_of(dict(enumerate(trails)) | narrow, trails, narrow)
+    assert verdict.as_published
+    assert verdict.hash == published.combined(trails)
+    assert not verdict_of({0: narrow[1]}, trails, narrow).as_published
 
 
 def test_a_missing_or_damaged_list_is_one_line(tmp_path):
     file = tmp_path / "list.parquet"
     with pytest.raises(InvalidInput, match="the list of certify is missing"):
         published.read(file)
-    published.write([b"12345678" + b"x"], file)
+    published.write([b"12345678" + b"x"], {}, file)
     assert published.read(file) == [b"12345678x"]
     file.write_bytes(b"no")
     with pytest.raises(ValueError, match="not a readable Parquet"):
@@ -320,7 +331,7 @@ def test_some_of_the_list_goes_as_published():
     """A short form of the certificate; `care-sim certify` is the whole."""
     short = [one for one in LIST if one.environment != STREET and one.keyframes <= 12]
     chosen = [one.number for one in playable_here(short)[0]][:28]
-    verdict = verdict_of(trails_of(chosen, 1), published.read())
+    verdict = verdict_of(trails_of(chosen, 1), published.read(), published.read_narrow())
     assert verdict.as_published, "\n".join(verdict.lines())
 
 
@@ -336,7 +347,7 @@ def test_a_seed_finder_of_the_list_knows_its_episode(name):
 @pytest.mark.slow
 def test_an_episode_of_a_street_goes_as_published():
     number = next(e.number for e in LIST if e.environment == STREET and e.keyframes <= 8)
-    verdict = verdict_of(trails_of([number], 1), published.read())
+    verdict = verdict_of(trails_of([number], 1), published.read(), published.read_narrow())
     assert verdict.as_published, "\n".join(verdict.lines())
 
 

@@ -1,27 +1,22 @@
-"""Environment variables under which numpy, OpenBLAS and numba compute as on a processor of fewer
-features.
-"""
+"""A processor without AVX-512, for child processes."""
 
 import os
 
-import numpy as np
-import pytest
 from numpy._core._multiarray_umath import __cpu_features__
 
-GROUPS = ("X86_V3", "X86_V4", "AVX512_ICL", "AVX512_SPR")
-"""numpy's dispatch groups beyond its baseline; of the wide ones it has vectorised arctangents."""
+_GROUPS = ("X86_V4", "AVX512_ICL", "AVX512_SPR")
+"""The groups of features in which NumPy has sines and arctangents of its own."""
+WIDE = bool(__cpu_features__.get("X86_V4"))
+"""Whether this processor has AVX-512."""
 
 
-def reduced(code=None):
-    """The environment variables of a child process; with a folder for `code`, numba compiles for a
-    processor of fewer features too. Skips the test where there is nothing to leave out.
+def without_avx512(code=None):
+    """The environment variables of a child process that computes as a processor without AVX-512
+    does; with a folder for `code`, its compiled code, too.
     """
-    present = [name for name in GROUPS if __cpu_features__.get(name)]
-    if "X86_V4" not in present:
-        pytest.skip(f"numpy {np.__version__} finds no AVX-512 here that could be left out")
-    compiled = {"NUMBA_CPU_NAME": "generic", "NUMBA_CACHE_DIR": str(code)} if code else {}
-    return (
-        os.environ
-        | compiled
-        | {"NPY_DISABLE_CPU_FEATURES": " ".join(present), "OPENBLAS_CORETYPE": "Nehalem"}
-    )
+    # That folder is not this processor's: of two processes that add code of two processors to one
+    # folder, one may overwrite the other's.
+    compiled = {"NUMBA_CPU_NAME": "haswell", "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(code)}
+    present = [name for name in _GROUPS if __cpu_features__.get(name)]
+    named = {"NPY_DISABLE_CPU_FEATURES": " ".join(present), "OPENBLAS_CORETYPE": "Haswell"}
+    return os.environ | named | (compiled if code else {})
