@@ -1,6 +1,6 @@
 # Times are for two quiet cores and include what Numba compiles, but neither set-up nor downloads.
 # make setup      create .venv and install what the benchmark needs (half a minute)
-# make reproduce  set up, run the paper's closed-loop study, print it beside the paper's figures (a minute)
+# make reproduce  set up, run the paper's closed-loop study, print it beside the paper's figures (2 minutes)
 # make smoke      set up with pytest, run a few tests per promise (a minute)
 # make test       set up with the development tools, run the tests (7 minutes)
 # make test-long  run those that take longer, all published streets among them (12 minutes)

@@ -6,6 +6,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+ONE_WORLD: Mask = np.ones(1, np.bool_)
+"""(1,) the mask of one world that plays, where many could."""
 
 
 def places(mask: Mask) -> list[int]:
@@ -19,7 +21,7 @@ def filled(table: np.ndarray, world: int, rows: np.ndarray) -> np.ndarray:
     they need more room than there is.
     """
     if len(rows) > table.shape[1]:
-        table = longer(table, 2 * len(rows))
+        table = longer(table, len(rows) * 5 // 4)
     table[world, : len(rows)] = rows
     return table
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.checks import check_arguments, check_choice, check_number
+from care_sim.core.arrays import ONE_WORLD
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.types import Action
 from care_sim.driving.drivers import check_driver
@@ -17,7 +18,6 @@ from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, detector_o
 from care_sim.envs.worlds import Setting, Worlds
 from care_sim.loops.one_world import OneWorld
 from care_sim.loops.records import Keyframe
-from care_sim.loops.stages.state import ONE_WORLD
 from care_sim.perception.detectors import PROXY
 from care_sim.scenarios import make_scenario, scenario_class
 from care_sim.scenarios.base import Scenario

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from care_sim.base.checks import as_array, check_flag, check_seed
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.seeds import check_secret
-from care_sim.core.arrays import Floats
+from care_sim.core.arrays import ONE_WORLD, Floats
 from care_sim.core.belief import MAX_DETECTIONS, MAX_TRACKS
 from care_sim.core.cells.stack import Grid
 from care_sim.core.conditions import MIN_RETURNS, Conditions
@@ -26,7 +26,7 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import Action
 from care_sim.loops.observation_limits import Limits
 from care_sim.loops.stages.choice import Choice, check_finite
-from care_sim.loops.stages.state import ONE_WORLD, Fired
+from care_sim.loops.stages.state import Fired
 from care_sim.loops.truth import TrueLoop, Truth
 from care_sim.perception.detectors import CLUSTER, PROXY, check_detector, make_detector
 from care_sim.perception.points_only import Detector

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from care_sim.core.arrays import Floats, Integers
+from care_sim.core.arrays import ONE_WORLD, Floats, Integers
 from care_sim.core.belief import Belief
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.frames import Frame
@@ -17,7 +17,7 @@ from care_sim.loops.loop import Loop
 from care_sim.loops.records import Keyframe, Records
 from care_sim.loops.stages.scanning import lidar_of
 from care_sim.loops.stages.sight import photographed
-from care_sim.loops.stages.state import ONE_WORLD, Fired
+from care_sim.loops.stages.state import Fired
 from care_sim.loops.truth import TrueLoop
 from care_sim.perception.points_only import Detector
 from care_sim.sensors.annotated import IdentifiedDetections

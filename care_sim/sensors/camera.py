@@ -9,7 +9,7 @@ import numpy as np
 from care_sim.base.compiled import compiled
 from care_sim.base.threads import ALONE, Threads
 from care_sim.base.times import LAST_BITS_S
-from care_sim.core.arrays import Floats, Integers, Mask, filled
+from care_sim.core.arrays import ONE_WORLD, Floats, Integers, Mask, filled
 from care_sim.core.conditions import KITTI_CAMERA, YOLOX_CAMERA, CameraFaults, Sensing
 from care_sim.core.pinhole import PinholeCamera, mounted_cameras
 from care_sim.core.rows import copy_row
@@ -258,9 +258,6 @@ def _sort_in(seen: Detected, world: int, n: int, place: int, has_false: bool) ->
     copy_row(row, rows[place])
 
 
-_HERE = np.ones(1, np.bool_)
-
-
 class CameraDetector:
     """The `CameraDetectors` of one world, in an episode with `objects` (n,)."""
 
@@ -284,5 +281,5 @@ class CameraDetector:
         """
         here, rows = Detected.of(1, len(seen)).put(0, seen), np.array([heading], float)
         told = (None if one is None else one[None] for one in (seen.visible, seen.pictures))
-        self._all.take(_HERE, here, rows, boxes[None], np.array([time_s], float), *told)
-        return self._all.newest(_HERE, rows).take(0)
+        self._all.take(ONE_WORLD, here, rows, boxes[None], np.array([time_s], float), *told)
+        return self._all.newest(ONE_WORLD, rows).take(0)

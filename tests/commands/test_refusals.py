@@ -77,7 +77,7 @@ judge --least-scores 2                    | least_scores must be from 0 to 1, go
 judge --detectors cluster --detector-parameters min_points=3 | DETECTOR.NAME=VALUE of one of cluster, got min_points
 export nuscenes --source argoverse2:x --out y | source must be nuscenes:FOLDER
 view TABLE                                | is no recording of `care-sim run --record`
-certify --episode 3 --all                 | episode plays one episode: remove all
+certify --episode 3 --all                 | episode plays one episode: leave --all out
 train learned-sets --out NOWHERE          | is a folder, a file is wanted
 """  # noqa: E501
 CASES = [line.split(" | ", 1) for line in LINES.strip("\n").splitlines()]

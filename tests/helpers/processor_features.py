@@ -14,8 +14,8 @@ def without_avx512(code=None):
     """The environment variables of a child process that computes as a processor without AVX-512
     does; with a folder for `code`, its compiled code, too.
     """
-    # That folder is not this processor's: of two processes that add code of two processors to one
-    # folder, one may overwrite the other's.
+    # It is another folder than this processor's: of two processes that add code of two processors
+    # to one, one may overwrite the other's.
     compiled = {"NUMBA_CPU_NAME": "haswell", "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(code)}
     present = [name for name in _GROUPS if __cpu_features__.get(name)]
     named = {"NPY_DISABLE_CPU_FEATURES": " ".join(present), "OPENBLAS_CORETYPE": "Haswell"}

@@ -278,4 +278,4 @@ class Certify(WorkerOptions):
         super().__post_init__()
         if self.episode is not None:
             check_whole("episode", self.episode, 0, ALL_EPISODES - 1)
-            _refuse((self.all, "episode plays one episode: remove all"))
+            _refuse((self.all, "--episode plays one episode: leave --all out"))

@@ -189,7 +189,6 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         # An error leaves worlds at different keyframes: then all have to begin anew.
         self._begun[:] = False
         stepped = self._worlds.step(fired, ~begins)
-        self._begun[:] = True
         self._steps += ~begins
         stepped.truncated[:] |= ~begins & (self._steps >= self._most_steps)
         over = stepped.terminated | stepped.truncated
@@ -208,6 +207,7 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         else:
             infos = self._begin(begins, anybody, self._infos(stepped, ~begins))
             self._over = over
+        self._begun[:] = True
         return self._handed_out(), stepped.rewards, stepped.terminated, stepped.truncated, infos
 
     def close_extras(self, **_: Any) -> None:

@@ -62,7 +62,7 @@ class Motion:
         self._timed = np.zeros((worlds, 1), np.int64)
         self._ways = np.zeros((worlds, 1, steps + 1, 5))
         self._by_itself: dict[int, World] = {}
-        self._built: list[World | None] = [None] * worlds
+        self._built: dict[int, World] = {}
         self._current = np.zeros(worlds, np.int64)
         metres = np.zeros(worlds), np.zeros(worlds)
         self._passages = Passages(*metres, np.zeros(worlds, np.bool_), np.zeros(worlds), {})
@@ -161,7 +161,6 @@ class Motion:
     def current(self, state: State, world: int) -> World:
         """A world as it is now."""
         built, step = self._built[world], int(self._steps[world])
-        assert built is not None
         if world not in self._by_itself and self._current[world] != step:
             self._current[world] = step
             bodies, egos = state.bodies, state.egos

@@ -24,8 +24,6 @@ from care_sim.world.world import World
 
 _BODIES, _PARTS, _CORNERS = 32, 128, 1024
 """Rows with which tables begin; they grow with what comes."""
-ONE_WORLD = np.ones(1, np.bool_)
-"""(1,) the mask of a loop of one world, in which that world plays."""
 
 
 class Bodies(NamedTuple):

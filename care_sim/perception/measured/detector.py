@@ -8,7 +8,7 @@ import numpy as np
 from care_sim.base.checks import check_flag, check_number
 from care_sim.base.errors import InvalidInput
 from care_sim.base.threads import ALONE, Threads
-from care_sim.core.arrays import Floats, Integers
+from care_sim.core.arrays import ONE_WORLD, Floats, Integers
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
@@ -28,7 +28,6 @@ GATHERED_S = 1.0
 those of the last ten keyframes, of 0.1 s each. With longer keyframes it has as many as fit in this
 time.
 """
-_HERE = np.ones(1, np.bool_)
 
 
 class MeasuredDetector(Detector):
@@ -147,14 +146,14 @@ class MeasuredEpisode(Detector):
         """See `care_sim.perception.points_only.Detector`."""
         self._meet(annotations.objects)
         sensor, world = self._sensor, self._world
-        candidates = world.advance(_HERE, np.array([[sensor.x, sensor.y]], float))
+        candidates = world.advance(ONE_WORLD, np.array([[sensor.x, sensor.y]], float))
         rows = candidates.rows[0, : candidates.counts[0]]
         rows[:, SEEN:] = sensor.boxes_to_local(rows[:, X:SCORE])
         classes, boxes = annotations.classes, np.ascontiguousarray(annotations.boxes, float)
         newest = cloud if cloud.newest is None else cloud.newest
         ranges = self._grid.ranges_to(newest.cells, newest.points)
         found = self._found = world.report(
-            _HERE,
+            ONE_WORLD,
             (_count(classes), annotations.objects[None], classes[None], boxes[None]),
             (_count(cloud.cells), cloud.cells[None], cloud.objects[None]),
             (_count(ranges), newest.cells[None], ranges[None]),

@@ -46,8 +46,10 @@ class PersistentNormals:
     def begin(self, world: int, objects: int, rng: np.random.Generator) -> None:
         """Begin an episode with so many objects."""
         always, slow = rng.standard_normal((2, objects, self._slow.shape[2]))
-        self._always = filled(self._always, world, self._lasting * always)
-        self._slow = filled(self._slow, world, slow)
+        self._always, self._slow = (
+            filled(self._always, world, self._lasting * always),
+            filled(self._slow, world, slow),
+        )
         self._started[world] = False
         self._draws.begin(world, partial(_moves, rng, slow.shape))
 

@@ -209,6 +209,27 @@ def test_after_an_error_all_worlds_begin_anew(vector, monkeypatch):
     assert vector.step(zeros(vector))[0]["tracks"].tobytes() == expected
 
 
+def test_after_an_error_of_a_world_that_begins_anew_all_begin_anew(monkeypatch):
+    """The others have moved on by a step that nobody was given, to their ends perhaps."""
+    env = native(NAME, 2, budget=0.03, duration_s=0.2)
+    env.reset(seed=0)
+    env.step(zeros(env))
+    env.reset(seed=[0, None], options={"reset_mask": np.array([True, False])})
+    assert env.step(zeros(env))[3].tolist() == [False, True]
+
+    def fails(_):
+        raise MemoryError
+
+    with monkeypatch.context() as broken:
+        broken.setattr(env._worlds, "begin", fails)
+        with pytest.raises(MemoryError):
+            env.step(zeros(env))
+    env.reset(seed=[None, 7], options={"reset_mask": np.array([False, True])})
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step(zeros(env))
+    env.close()
+
+
 @pytest.mark.usefixtures("interruptible")
 def test_worlds_begin_after_what_an_interrupt_left_at_work(vector, monkeypatch):
     done, seen, begin = [], [], vector._worlds.begin
