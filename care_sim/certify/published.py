@@ -1,4 +1,6 @@
-"""The published trails, a file of the package."""
+"""The published trails, a file of the package with a row per episode: `trail`, and `narrow` where
+the episode goes another way on x86 processors without AVX-512, else null.
+"""
 
 import hashlib
 from collections.abc import Mapping, Sequence
@@ -21,8 +23,8 @@ def read(path: Path = FILE) -> list[bytes]:
 
 
 def read_narrow(path: Path = FILE) -> dict[int, bytes]:
-    """The trails of episodes that go otherwise on a processor without AVX-512, by number: NumPy
-    rounds the last bit of some sines and arctangents otherwise there.
+    """The trails by number of the episodes that differ without AVX-512: NumPy rounds some sines and
+    arctangents differently there. Raises InvalidInput for a missing file.
     """
     trails = _column("narrow", path)
     return {number: trail for number, trail in enumerate(trails) if trail is not None}
@@ -36,7 +38,7 @@ def _column(name: str, path: Path) -> list[bytes | None]:
 
 
 def write(trails: Sequence[bytes], narrow: Mapping[int, bytes], path: Path = FILE) -> None:
-    """Publish the trails of the episodes from 0 on, and those of `read_narrow`."""
+    """Publish the `trails` of the episodes from 0 on, and the `narrow` ones of `read_narrow`."""
     others = [narrow.get(number) for number in range(len(trails))]
     write_columns({"trail": [*trails], "narrow": others}, path)
 

@@ -65,8 +65,8 @@ class Verdict:
 def verdict_of(
     found: Trails, published: Sequence[bytes], narrow: Mapping[int, bytes], asked: int = 0
 ) -> Verdict:
-    """Compare trails with the published ones of the same numbers; `narrow` are those of processors
-    without AVX-512, which count as the others. `asked` is how many episodes were asked for, where
+    """Compare trails with the published ones of the same numbers; those of processors without
+    AVX-512, `narrow` by number, count as these. `asked` is how many episodes were asked for, where
     not all of them were played.
     """
     # All processors that play as published get the same hash.

@@ -18,7 +18,7 @@ def certify(options: Certify) -> int:
     numbers = [*range(ALL_EPISODES if options.all else CERTIFIED_EPISODES)]
     if options.episode is not None:
         numbers = [options.episode]
-    known = published.read()
+    known, narrow = published.read(), published.read_narrow()
     if numbers[-1] >= len(known):
         raise InvalidInput(f"the published list has {len(known):,} episodes")
     episodes, lacking = playing.playable_here([drawn(number) for number in numbers])
@@ -29,6 +29,6 @@ def certify(options: Certify) -> int:
         found = playing.trails_of(
             [episode.number for episode in episodes], options.workers, lambda done: show(done, "")
         )
-    verdict = verdict_of(found, known, published.read_narrow(), len(numbers))
+    verdict = verdict_of(found, known, narrow, len(numbers))
     print(*verdict.lines(), sep="\n")
     return DONE if verdict.as_published else FAILED

@@ -7,7 +7,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 ONE_WORLD: Mask = np.ones(1, np.bool_)
-"""(1,) the mask of one world that plays, where many could."""
+"""(1,) the mask of a single world, which plays."""
 
 
 def places(mask: Mask) -> list[int]:
@@ -21,6 +21,7 @@ def filled(table: np.ndarray, world: int, rows: np.ndarray) -> np.ndarray:
     they need more room than there is.
     """
     if len(rows) > table.shape[1]:
+        # A quarter more than is needed: a large vector has a table of meshes per world.
         table = longer(table, len(rows) * 5 // 4)
     table[world, : len(rows)] = rows
     return table

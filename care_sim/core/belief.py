@@ -11,7 +11,7 @@ from care_sim.base.checks import as_array
 from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput
 from care_sim.core.allocation import half_up
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import ONE_WORLD, Floats, Integers, Mask
 from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
 
 SOUND, BEYOND, NO_ROW = range(3)
@@ -113,8 +113,6 @@ HIGHEST = 2.0**24
 """No number of an observation is larger: the largest whole number that float32 holds beside all
 smaller ones."""
 
-_ONE = np.ones(1, np.bool_)
-
 Observation = Mapping[str, NDArray[np.float32]]
 
 
@@ -208,7 +206,7 @@ def _rows(observation: Observation, key: str, columns: Sequence[str]) -> Floats:
     """The rows of a table that are no padding, checked here once and for all. Raises InvalidInput
     as `rows_of` does.
     """
-    return rows_of(array_of(observation, key, 2, len(columns))[None], _ONE, key, columns)[0]
+    return rows_of(array_of(observation, key, 2, len(columns))[None], ONE_WORLD, key, columns)[0]
 
 
 def rows_of(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.allocation import halves_up
-from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.arrays import ONE_WORLD, Floats, Integers, Mask
 from care_sim.core.belief import (
     HIGHEST,
     OBSERVED,
@@ -24,8 +24,6 @@ from care_sim.core.belief import (
 from care_sim.core.cells.sets import WorldSets
 from care_sim.core.rig import Rig
 from care_sim.core.types import ImageDetections, Tracks
-
-_ONE = np.ones(1, np.bool_)
 
 
 @dataclass(eq=False)
@@ -55,7 +53,7 @@ class Beliefs:
         counts = np.array([len(detections), len(tracks), belief.budget])
         egos = np.array([[ego.speed, ego.yaw_rate, ego.acceleration]])
         rows = detections, tracks, counts[:1], counts[1:2]
-        return cls(rig, _ONE, egos, counts[2:], belief.ranges[None], *rows)
+        return cls(rig, ONE_WORLD, egos, counts[2:], belief.ranges[None], *rows)
 
     @classmethod
     def from_observation(

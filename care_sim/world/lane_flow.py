@@ -1,5 +1,5 @@
-"""The vehicles of one lane, each driven by the intelligent driver model (IDM), all at once. The
-traffic of a street with bends and side streets is a flow per lane, laid along its road.
+"""The vehicles of all lanes of a street, driven at once by the intelligent driver model (IDM).
+`StreetTraffic` lays them along roads with bends and side streets.
 
 The model (Treiber, Hennecke and Helbing 2000), its numbers and its order of operations are those of
 highway-env's `IDMVehicle`, which `care_sim.world.traffic` asks vehicle by vehicle. Where nobody
@@ -45,15 +45,17 @@ class LaneFlow:
     """(n,) numbers of lanes."""
 
     def __init__(self, places: Sequence[float], wanted: Sequence[float], lanes: Sequence[int]):
-        """Vehicles at `places` that drive at the speeds `wanted` (m/s, above 0), and want to."""
+        """Vehicles at `places` (n,) in `lanes` (n,). They drive at the speeds that they want,
+        `wanted` (n,), m/s above 0.
+        """
         self.places = np.array(places, float)
         self.speeds = np.array(wanted, float)
         self.lanes = np.array(lanes, np.int64)
         self._wanted = self.speeds.copy()
 
     def step(self, dt: float, others: Sequence[Other] = ()) -> None:
-        """Let every driver decide, then move all by `dt` seconds. There are `others` in the
-        lanes.
+        """Let every driver decide, then move all by `dt` seconds. Drivers follow the `others` in
+        their lane, too.
         """
         # The power is NumPy's, as compiled code may round it differently.
         free = 1 - (self.speeds / self._wanted) ** EXPONENT

@@ -9,7 +9,7 @@ import numpy as np
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput
 from care_sim.base.times import LAST_BITS_S
-from care_sim.core.arrays import Floats, Integers
+from care_sim.core.arrays import ONE_WORLD, Floats, Integers
 from care_sim.core.frames import Pose
 from care_sim.core.types import CLASSES, Ego
 from care_sim.world.approach import ClosestApproach
@@ -281,17 +281,17 @@ class World:
         clearances, impacts = Clearances(1, steps), Impacts(1, WORLD_STEP_S)
         clearances.begin(0, None if target is None else (self.ego_kind, target.kind))
         impacts.begin(0, self.kinds)
-        here, nearest_m, impact = np.ones(1, np.bool_), np.full(1, np.inf), None
+        nearest_m, impact = np.full(1, np.inf), None
         egos = np.array([self.ego_body])
         targets = np.array([NO_BODY if target is None else target.body])
         for step in range(1, steps + 1):
             self.step(acceleration)
             boxes, before = self._footprints.boxes[None], self._before[None]
             poses, counts = self.bullet.primitives.poses[None], np.array([boxes.shape[1]])
-            clearances.note(here, np.array([step]), boxes, poses, (egos, targets), nearest_m)
+            clearances.note(ONE_WORLD, np.array([step]), boxes, poses, (egos, targets), nearest_m)
             if impact is None:
                 bodies = counts, boxes, before, poses
-                touched = impacts.now(here, *bodies, egos, np.array([self.ego.speed], float))
+                touched = impacts.now(ONE_WORLD, *bodies, egos, np.array([self.ego.speed], float))
                 impact = next((one for _, one in touched), None)
         return ClosestApproach(float(nearest_m[0]), clearances.least(0, 1, steps + 1), impact)
 

@@ -1,6 +1,6 @@
 """The certificate on a processor without AVX-512."""
 
-import json
+import pickle
 import subprocess
 import sys
 
@@ -10,20 +10,18 @@ from tests.helpers.processor_features import without_avx512
 
 
 def trails_elsewhere(numbers, workers, code):
-    """The trails of episodes as such a processor plays them; `code` is a folder for its code."""
+    """Return what `trails_of` returns on such a processor; `code` is a folder for its code."""
     child = subprocess.run(
         [sys.executable, "-m", "tests.certify.elsewhere", str(workers)],
         cwd=ROOT,
         env=without_avx512(code),
-        input=json.dumps(numbers),
+        input=pickle.dumps(numbers),
         stdout=subprocess.PIPE,
-        text=True,
         check=True,
     )
-    told = json.loads(child.stdout.splitlines()[-1])
-    return {int(number): bytes.fromhex(trail) for number, trail in told.items()}
+    return pickle.loads(child.stdout)
 
 
 if __name__ == "__main__":
-    asked, processes = json.load(sys.stdin), int(sys.argv[1])
-    print(json.dumps({n: trail.hex() for n, trail in trails_of(asked, processes).items()}))
+    numbers, workers = pickle.load(sys.stdin.buffer), int(sys.argv[1])
+    pickle.dump(trails_of(numbers, workers), sys.stdout.buffer)

@@ -1,5 +1,5 @@
-"""Publish the list of the certificate anew: `python -m tests.certify.publish`, an hour. It needs a
-processor with AVX-512.
+"""Publish the list of the certificate anew: `python -m tests.certify.publish` (takes an hour, on a
+processor with AVX-512).
 """
 
 import sys
@@ -21,11 +21,11 @@ def main():
     if lacking:
         return lacking
     found = playing.trails_of(numbers, WORKERS)
-    for number, trail in found.items():
-        if isinstance(trail, str):
-            return f"nothing is written: episode {number} was not played: {trail}"
     with tempfile.TemporaryDirectory() as code:
         there = trails_elsewhere(numbers, WORKERS, code)
+    for number, trail in [*found.items(), *there.items()]:
+        if isinstance(trail, str):
+            return f"nothing is written: episode {number} was not played: {trail}"
     trails = [found[number] for number in numbers]
     narrow = {number: trail for number, trail in there.items() if trail != found[number]}
     published.write(trails, narrow)

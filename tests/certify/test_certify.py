@@ -14,7 +14,7 @@ import pytest
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
 from care_sim.base.errors import InvalidInput, MissingExtra
-from care_sim.certify import CERTIFIED_EPISODES, design, playing, published, trail
+from care_sim.certify import ALL_EPISODES, CERTIFIED_EPISODES, design, playing, published, trail
 from care_sim.certify.design import (
     AS_LISTED,
     CERTIFIED_POLICIES,
@@ -352,7 +352,8 @@ def test_an_episode_of_a_street_goes_as_published():
     assert verdict.as_published, "\n".join(verdict.lines())
 
 
-def test_the_page_tells_the_hash_of_the_list():
+def test_the_page_tells_the_hash_of_the_list_and_how_much_differs_without_avx512():
     page = (ROOT / "docs" / "reproducibility.md").read_text()
     told = published.combined(published.read()[:CERTIFIED_EPISODES])
     assert f"{CERTIFIED_EPISODES:,} episodes: {told}" in page
+    assert f"{len(published.read_narrow())} of the {ALL_EPISODES:,} below" in page

@@ -6,6 +6,7 @@ from collections import Counter, defaultdict
 
 import numpy as np
 
+from care_sim.core.arrays import ONE_WORLD
 from care_sim.sensors.kitti.beside import PAIRS
 from care_sim.sensors.kitti.detector import report
 from care_sim.sensors.kitti.draws import PersistentNormals, Renewals, key_of
@@ -16,7 +17,6 @@ DRIVES = FOLDER.parent / "kitti-tracking" / "training" / "label_02"
 NAMES = "0001", "0004", "0008", "0015", "0020"
 """The drives from which the pictures of the object benchmark's validation half are."""
 SECONDS = 0.1
-HERE = np.ones(1, np.bool_)
 BEYOND = np.array([0.0, 0.15, 0.3])
 """Shares beyond the picture of the tracking benchmark's levels of truncation (assumed)."""
 
@@ -82,9 +82,9 @@ def played(name, measured, seed):
         shown = type(labels)(*(column[own] for column in labels))
         shown = shown._replace(cameras=np.zeros(own.sum(), np.int64), places=places[own])
         now = np.uint64(key_of(key, frame, 0, 0))
-        began, scenes = beside.next(HERE)[0, :objects], scene.next(HERE)[0, :1]
-        own_luck = np.ascontiguousarray(luck.next(HERE)[0, :objects, 0])
-        errors = edges.next(HERE)[0, :objects]
+        began, scenes = beside.next(ONE_WORLD)[0, :objects], scene.next(ONE_WORLD)[0, :1]
+        own_luck = np.ascontiguousarray(luck.next(ONE_WORLD)[0, :objects, 0])
+        errors = edges.next(ONE_WORLD)[0, :objects]
         chance = Chance(false_key, now, own_luck, errors, began, scenes)
         made, _ = report(shown, PICTURE[None], nothing, chance, measured.numbers)
         frames = np.full(len(made.scores), frame)

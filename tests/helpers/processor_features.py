@@ -5,7 +5,7 @@ import os
 from numpy._core._multiarray_umath import __cpu_features__
 
 _GROUPS = ("X86_V4", "AVX512_ICL", "AVX512_SPR")
-"""The groups of features in which NumPy has sines and arctangents of its own."""
+"""The groups of features, named as by NumPy 2.4, in which it has arctangents of its own."""
 WIDE = bool(__cpu_features__.get("X86_V4"))
 """Whether this processor has AVX-512."""
 
@@ -14,8 +14,8 @@ def without_avx512(code=None):
     """The environment variables of a child process that computes as a processor without AVX-512
     does; with a folder for `code`, its compiled code, too.
     """
-    # It is another folder than this processor's: of two processes that add code of two processors
-    # to one, one may overwrite the other's.
+    # The code needs a folder of its own: two processes that write code of two processors into one
+    # may overwrite each other's.
     compiled = {"NUMBA_CPU_NAME": "haswell", "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(code)}
     present = [name for name in _GROUPS if __cpu_features__.get(name)]
     named = {"NPY_DISABLE_CPU_FEATURES": " ".join(present), "OPENBLAS_CORETYPE": "Haswell"}

@@ -17,7 +17,7 @@ def clone(tmp_path):
     (tmp_path / "bin" / "dirname").symlink_to(shutil.which("dirname"))
     for name in ("apt-get", "make"):
         program(tmp_path / "bin" / name, f'echo "{name} $* $DEBIAN_FRONTEND" >>"{tmp_path}/told"')
-    for folder in (".venv", "build/python3.13"):
+    for folder in (".venv", "build/python3.12", "build/python3.13"):
         command = f'echo "{folder} $*" >>"{tmp_path}/told"'
         program(tmp_path / folder / "bin" / "care-sim", command)
     return tmp_path
@@ -67,3 +67,11 @@ def test_later_pythons_that_run_are_tested_and_the_others_named(clone):
     assert out == "Python 3.12 is not here: nothing was tested with it\n"
     smoke = f"make smoke PYTHON={python} VENV=build/python3.13 noninteractive"
     assert told[-2:] == [smoke, "build/python3.13 certify"]
+
+
+def test_the_last_python_alone_plays_the_published_episodes(clone):
+    for version in ("3.12", "3.13"):
+        program(clone / "bin" / f"python{version}", "exit 0")
+    _, told = ran(clone)
+    certified = [line for line in told if line.endswith(" certify")]
+    assert certified == ["build/python3.13 certify"]

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import care_sim
 from care_sim.base.errors import InvalidInput
+from care_sim.core.arrays import ONE_WORLD
 from care_sim.core.conditions import CameraFaults, Conditions, Sensing
 from care_sim.core.frames import Frame
 from care_sim.core.types import CLASSES
@@ -154,7 +155,6 @@ def test_rendering_only_a_window_shows_the_same_bodies(bullet):
             assert np.abs(before.max(axis=0) - after.max(axis=0)).max() <= 1
 
 
-HERE = np.ones(1, np.bool_)
 NEAR, FAR = np.full(40, 10.0), np.full(40, 30.0)
 
 
@@ -162,7 +162,7 @@ def missed_by(frames, ranges=NEAR, seed=0, **faults):
     """(frames, objects) who was missed."""
     misses = Misses([CameraFaults(**faults)])
     misses.begin(0, np.random.SeedSequence(seed), len(ranges))
-    return np.array([misses.draw(HERE, ranges[None])[0] for _ in range(frames)])
+    return np.array([misses.draw(ONE_WORLD, ranges[None])[0] for _ in range(frames)])
 
 
 def runs(missing):
@@ -216,8 +216,8 @@ def delivered(latency, jitter, frames, seed=0):
     handed_out = []
     for n in range(frames):
         heading = np.array([0.01 * n])
-        delay.take(HERE, tagged(n), heading)
-        handed_out.append(delay.newest(HERE, heading).take(0))
+        delay.take(ONE_WORLD, tagged(n), heading)
+        handed_out.append(delay.newest(ONE_WORLD, heading).take(0))
     assert all(seen.objects.tolist() == seen.detections.boxes[:, 0].tolist() for seen in handed_out)
     return [seen.detections for seen in handed_out]
 

@@ -4,10 +4,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from care_sim.core.arrays import ONE_WORLD
 from care_sim.core.conditions import CameraFaults
 from care_sim.sensors.camera_faults import Delay, Detected, DrawnAhead, Misses
-
-HERE = np.ones(1, np.bool_)
 
 
 @given(st.integers(0, 2**32), st.integers(0, 12), st.integers(0, 9))
@@ -51,7 +50,7 @@ def test_the_misses_are_those_of_one_world(seed, faults):
         missed = together.draw(live, ranges)
         for world in np.flatnonzero(live).tolist():
             size = sizes[world]
-            expected = apart[world].draw(HERE, ranges[[world], :size])
+            expected = apart[world].draw(ONE_WORLD, ranges[[world], :size])
             assert missed[[world], :size].tolist() == expected.tolist()
 
 
@@ -78,8 +77,8 @@ def test_what_is_late_arrives_as_in_one_world(seed, latencies, jitters):
         arrived = together.newest(live, headings)
         for world in np.flatnonzero(live).tolist():
             own = [table[[world]] for table in (counts, rows, objects)]
-            apart[world].take(HERE, Detected(*own), headings[[world]])
-            expected = apart[world].newest(HERE, headings[[world]]).take(0)
+            apart[world].take(ONE_WORLD, Detected(*own), headings[[world]])
+            expected = apart[world].newest(ONE_WORLD, headings[[world]]).take(0)
             found = arrived.take(world)
             assert found.detections.rows().tolist() == expected.detections.rows().tolist()
             assert found.objects.tolist() == expected.objects.tolist()

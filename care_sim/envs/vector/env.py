@@ -207,8 +207,9 @@ class ClosedLoopVectorEnv(VectorEnv[Observed, Action, Any]):
         else:
             infos = self._begin(begins, anybody, self._infos(stepped, ~begins))
             self._over = over
+        observed = self._handed_out()
         self._begun[:] = True
-        return self._handed_out(), stepped.rewards, stepped.terminated, stepped.truncated, infos
+        return observed, stepped.rewards, stepped.terminated, stepped.truncated, infos
 
     def close_extras(self, **_: Any) -> None:
         """Free the worlds and end the threads."""

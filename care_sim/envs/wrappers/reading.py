@@ -49,8 +49,8 @@ def rig_of(env: AnyVector) -> Rig:
 
 
 def shows_belief(env: gymnasium.Env[Any, Any] | AnyVector) -> bool:
-    """Whether observations, of a vector those of each world, have the form of CARE-Sim's
-    environments, whatever wrappers did.
+    """Whether observations have the form of CARE-Sim's environments, whatever wrappers did. In a
+    vector, those of each world count.
     """
     space = env.single_observation_space if isinstance(env, VectorEnv) else env.observation_space
     return isinstance(space, spaces.Dict) and set(OBSERVED) <= set(space.keys())

@@ -1,5 +1,6 @@
 """Actions of a few numbers instead of one per cell: scores of azimuth x elevation sectors."""
 
+from abc import abstractmethod
 from typing import Any
 
 import gymnasium
@@ -39,9 +40,9 @@ class _Sectors:
         self._fired = SectorActions(rig, self.sectors, np.array(budgets))
         return spaces.Box(-1.0, 1.0, self.sectors.shape, np.float32)
 
+    @abstractmethod
     def action(self, action: NDArray[np.float32]) -> Action:
         """Scores of the cells that the shared allocator takes."""
-        raise NotImplementedError
 
     def _stepped(self, action: NDArray[np.float32]) -> Any:
         return self.env.step(self.action(action))

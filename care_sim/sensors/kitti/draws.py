@@ -46,6 +46,7 @@ class PersistentNormals:
     def begin(self, world: int, objects: int, rng: np.random.Generator) -> None:
         """Begin an episode with so many objects."""
         always, slow = rng.standard_normal((2, objects, self._slow.shape[2]))
+        # Both tables grow or neither does: `next` adds them.
         self._always, self._slow = (
             filled(self._always, world, self._lasting * always),
             filled(self._slow, world, slow),

@@ -209,19 +209,22 @@ def test_after_an_error_all_worlds_begin_anew(vector, monkeypatch):
     assert vector.step(zeros(vector))[0]["tracks"].tobytes() == expected
 
 
-def test_after_an_error_of_a_world_that_begins_anew_all_begin_anew(monkeypatch):
-    """The others have moved on by a step that nobody was given, to their ends perhaps."""
+@pytest.mark.parametrize(
+    "broken", [lambda env: (env._worlds, "begin"), lambda env: (env, "_handed_out")]
+)
+def test_after_an_error_past_the_step_of_the_worlds_all_begin_anew(broken, monkeypatch):
+    """All worlds have made a step whose results nobody received."""
     env = native(NAME, 2, budget=0.03, duration_s=0.2)
     env.reset(seed=0)
     env.step(zeros(env))
     env.reset(seed=[0, None], options={"reset_mask": np.array([True, False])})
     assert env.step(zeros(env))[3].tolist() == [False, True]
 
-    def fails(_):
+    def fails(*_):
         raise MemoryError
 
-    with monkeypatch.context() as broken:
-        broken.setattr(env._worlds, "begin", fails)
+    with monkeypatch.context() as patch:
+        patch.setattr(*broken(env), fails)
         with pytest.raises(MemoryError):
             env.step(zeros(env))
     env.reset(seed=[None, 7], options={"reset_mask": np.array([False, True])})

@@ -7,10 +7,10 @@ import pytest
 from scipy.stats import kstest
 
 from care_sim.base.hashing import normal, uniform
+from care_sim.core.arrays import ONE_WORLD
 from care_sim.sensors.kitti.draws import PersistentNormals, Renewals, key_of
 
 KEYFRAME_S = 0.1
-HERE = np.ones(1, np.bool_)
 
 
 def test_chance_of_many_worlds_is_that_of_each_alone():
@@ -29,7 +29,7 @@ def test_chance_of_many_worlds_is_that_of_each_alone():
             live = rng.random(3) < 0.7
             numbers = together.next(live)
             for world in np.flatnonzero(live).tolist():
-                expected = apart[world].next(HERE)[0, : sizes[world]]
+                expected = apart[world].next(ONE_WORLD)[0, : sizes[world]]
                 assert np.array_equal(numbers[world, : sizes[world]], expected)
 
 
@@ -48,7 +48,7 @@ def test_normal_numbers_are_drawn_keyframe_by_keyframe():
             slow = kept * slow + np.sqrt(1 - kept**2) * moves
         expected = np.sqrt(lasting) * always + np.sqrt(share) * slow
         expected = expected + np.sqrt(1 - lasting - share) * fresh
-        assert np.array_equal(draws.next(HERE)[0, :3, 0], expected)
+        assert np.array_equal(draws.next(ONE_WORLD)[0, :3, 0], expected)
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def test_normal_numbers_are_drawn_keyframe_by_keyframe():
 def test_normal_numbers_are_correlated_as_stated(lasting, share, time_s):
     draws = PersistentNormals(1, 1, lasting, share, time_s, KEYFRAME_S)
     draws.begin(0, 4000, np.random.default_rng(0))
-    numbers = np.array([draws.next(HERE)[0, :4000, 0] for _ in range(40)])
+    numbers = np.array([draws.next(ONE_WORLD)[0, :4000, 0] for _ in range(40)])
     assert numbers.std(axis=1) == pytest.approx(np.ones(40), abs=0.05)
     for lag in (1, 3, 10, 30):
         expected = lasting + share * np.exp(-lag * KEYFRAME_S / time_s)
@@ -68,7 +68,7 @@ def test_normal_numbers_are_correlated_as_stated(lasting, share, time_s):
 def test_states_stay_as_long_as_stated():
     states = Renewals(1, 1, 0.24, KEYFRAME_S)
     states.begin(0, 5000, np.random.default_rng(0))
-    begun = np.array([states.next(HERE)[0, :5000] for _ in range(8)])
+    begun = np.array([states.next(ONE_WORLD)[0, :5000] for _ in range(8)])
     for lag in (1, 2, 5):
         stayed = np.mean(begun[lag:] == begun[:-lag])
         assert stayed == pytest.approx(np.exp(-lag * KEYFRAME_S / 0.24), abs=0.01)
