@@ -13,15 +13,15 @@ from tests.torture.processes import Command
 from tests.torture.wrong import KINDS, WAYS
 
 SHORT = {
-    "commands": 45,
-    "calls": 300,
-    "files": 28,
-    "recordings": 60,
-    "studies": 4,
-    "folders": 30,
+    "commands": 24,
+    "calls": 150,
+    "files": 14,
+    "recordings": 30,
+    "studies": 2,
+    "folders": 16,
     "surroundings": 44,
 }
-"""Cases of each campaign: 50 seconds together, on two cores."""
+"""Cases of each campaign: half a minute together, on two cores."""
 
 
 @pytest.fixture(scope="module")

@@ -60,6 +60,6 @@ def test_drawn_worlds_are_single_ones(number):
 @pytest.mark.slow
 @pytest.mark.parametrize("batch", range(BATCHES))
 def test_two_thousand_drawn_worlds_are_single_ones(batch):
-    """As many as CARE_SIM_DRAWN says: `.ci/run` has 200."""
+    """As many as CARE_SIM_DRAWN says: `.ci/run` has 100."""
     numbers = range(100 + 100 * batch, 200 + 100 * batch)
     assert {number: found for number in numbers if (found := first_difference(number))} == {}
