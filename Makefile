@@ -1,9 +1,9 @@
 # Times are for two quiet cores and include what Numba compiles, but neither set-up nor downloads.
 # make setup      create .venv and install what the benchmark needs (half a minute)
 # make reproduce  set up, run the paper's closed-loop study, print it beside the paper's figures (2 minutes)
-# make smoke      set up with pytest, run a few tests per promise (a minute)
+# make smoke      set up with pytest, run a few tests per promise (2 minutes)
 # make test       set up with the development tools, run the tests (7 minutes)
-# make test-long  run those that take longer, all published streets among them (12 minutes)
+# make test-long  run those that take longer, all published streets among them (25 minutes)
 # make dist       build the sdist, and the wheel from it, in dist/
 # make test-installed   install that wheel in an environment of its own, run the sdist's tests with it
 # make test-extras   install that wheel with one extra after the other, each alone, and use it; EXTRAS="viewer video"

@@ -1,5 +1,5 @@
-"""Publish the list of the certificate anew: `python -m tests.certify.publish` (takes an hour, on a
-processor with AVX-512).
+"""Publish the list of the certificate anew: `python -m tests.certify.publish` (takes half an hour,
+on a processor with AVX-512).
 """
 
 import sys

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import kstest
 
 from care_sim.base.hashing import normal, uniform
-from care_sim.core.arrays import ONE_WORLD
+from care_sim.core.arrays import ONE_WORLD, filled
 from care_sim.sensors.kitti.draws import PersistentNormals, Renewals, key_of
 
 KEYFRAME_S = 0.1
@@ -49,6 +49,25 @@ def test_normal_numbers_are_drawn_keyframe_by_keyframe():
         expected = np.sqrt(lasting) * always + np.sqrt(share) * slow
         expected = expected + np.sqrt(1 - lasting - share) * fresh
         assert np.array_equal(draws.next(ONE_WORLD)[0, :3, 0], expected)
+
+
+def test_tables_that_cannot_grow_both_stay_as_they_are(monkeypatch):
+    draws = PersistentNormals(2, 1, 0.3, 0.5, 0.4, KEYFRAME_S)
+    grown = []
+
+    def fails_at_the_second(*given):
+        grown.append(given)
+        if len(grown) == 2:
+            raise MemoryError
+        return filled(*given)
+
+    with monkeypatch.context() as patch:
+        patch.setattr("care_sim.sensors.kitti.draws.filled", fails_at_the_second)
+        with pytest.raises(MemoryError):
+            draws.begin(0, 40, np.random.default_rng(0))
+    for world in range(2):
+        draws.begin(world, 2, np.random.default_rng(world))
+    assert np.isfinite(draws.next(np.ones(2, np.bool_))).all()
 
 
 @pytest.mark.parametrize(
